@@ -50,19 +50,43 @@ Communicator::~Communicator() {
   if (finalized == 0) MPI_Comm_free(&comm_);
 }
 
-Real Communicator::sum(Real mine) const { return reduce(comm_, mine, MPI_SUM); }
-GlobalId Communicator::sum(GlobalId mine) const { return reduce(comm_, mine, MPI_SUM); }
-Real Communicator::max(Real mine) const { return reduce(comm_, mine, MPI_MAX); }
-GlobalId Communicator::max(GlobalId mine) const { return reduce(comm_, mine, MPI_MAX); }
-Real Communicator::min(Real mine) const { return reduce(comm_, mine, MPI_MIN); }
-GlobalId Communicator::min(GlobalId mine) const { return reduce(comm_, mine, MPI_MIN); }
-bool Communicator::all(bool mine) const { return min(static_cast<GlobalId>(mine)) == 1; }
-bool Communicator::any(bool mine) const { return max(static_cast<GlobalId>(mine)) == 1; }
+Real Communicator::sum(Real mine) const {
+  return reduce(comm_, mine, MPI_SUM);
+}
+GlobalId Communicator::sum(GlobalId mine) const {
+  return reduce(comm_, mine, MPI_SUM);
+}
+Real Communicator::max(Real mine) const {
+  return reduce(comm_, mine, MPI_MAX);
+}
+GlobalId Communicator::max(GlobalId mine) const {
+  return reduce(comm_, mine, MPI_MAX);
+}
+Real Communicator::min(Real mine) const {
+  return reduce(comm_, mine, MPI_MIN);
+}
+GlobalId Communicator::min(GlobalId mine) const {
+  return reduce(comm_, mine, MPI_MIN);
+}
+bool Communicator::all(bool mine) const {
+  return min(static_cast<GlobalId>(mine)) == 1;
+}
+bool Communicator::any(bool mine) const {
+  return max(static_cast<GlobalId>(mine)) == 1;
+}
 
-void Communicator::sum_in_place(std::span<Real> values) const { reduce_in_place(comm_, values, MPI_SUM); }
-void Communicator::sum_in_place(std::span<GlobalId> values) const { reduce_in_place(comm_, values, MPI_SUM); }
-void Communicator::max_in_place(std::span<Real> values) const { reduce_in_place(comm_, values, MPI_MAX); }
-void Communicator::min_in_place(std::span<Real> values) const { reduce_in_place(comm_, values, MPI_MIN); }
+void Communicator::sum_in_place(std::span<Real> values) const {
+  reduce_in_place(comm_, values, MPI_SUM);
+}
+void Communicator::sum_in_place(std::span<GlobalId> values) const {
+  reduce_in_place(comm_, values, MPI_SUM);
+}
+void Communicator::max_in_place(std::span<Real> values) const {
+  reduce_in_place(comm_, values, MPI_MAX);
+}
+void Communicator::min_in_place(std::span<Real> values) const {
+  reduce_in_place(comm_, values, MPI_MIN);
+}
 
 GlobalId Communicator::sum_of_lower_ranks(GlobalId mine) const {
   GlobalId result = 0;
@@ -118,6 +142,8 @@ bool Communicator::broadcast(bool value, int root) const {
   return flag == 1;
 }
 
-void Communicator::barrier() const { MPI_Barrier(comm_); }
+void Communicator::barrier() const {
+  MPI_Barrier(comm_);
+}
 
 }  // namespace malleus

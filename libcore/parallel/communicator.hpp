@@ -40,7 +40,7 @@ class Communicator {
   void max_in_place(std::span<Real> values) const;
   void min_in_place(std::span<Real> values) const;
 
-  GlobalId sum_of_lower_ranks(GlobalId mine) const;  ///< exclusive prefix sum; 0 on rank 0
+  GlobalId sum_of_lower_ranks(GlobalId mine) const;          ///< exclusive prefix sum; 0 on rank 0
   std::vector<GlobalId> gather_to_all(GlobalId mine) const;  ///< one value a rank: for layouts only
   std::vector<Real> gather_to_all(Real mine) const;
 

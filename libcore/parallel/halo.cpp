@@ -54,8 +54,12 @@ std::vector<std::vector<T>> swap_buffers(MPI_Comm comm, const std::vector<Halo::
   return incoming;
 }
 
-const std::vector<LocalId>& sends_of(const Halo::Partner& partner) { return partner.sends; }
-const std::vector<LocalId>& receives_of(const Halo::Partner& partner) { return partner.receives; }
+const std::vector<LocalId>& sends_of(const Halo::Partner& partner) {
+  return partner.sends;
+}
+const std::vector<LocalId>& receives_of(const Halo::Partner& partner) {
+  return partner.receives;
+}
 
 }  // namespace
 
@@ -123,8 +127,12 @@ void Halo::combine(std::span<Real> values, int components, Combine apply) const 
   }
 }
 
-void Halo::update_copies(std::span<Real> values, int components) const { update(values, components); }
-void Halo::update_copies(std::span<GlobalId> values, int components) const { update(values, components); }
+void Halo::update_copies(std::span<Real> values, int components) const {
+  update(values, components);
+}
+void Halo::update_copies(std::span<GlobalId> values, int components) const {
+  update(values, components);
+}
 
 void Halo::add_to_owners(std::span<Real> values, int components) const {
   combine(values, components, [](Real a, Real b) { return a + b; });

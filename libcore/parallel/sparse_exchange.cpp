@@ -43,7 +43,8 @@ std::vector<Parcel> sparse_exchange(const Communicator& comm, std::vector<Parcel
     sizes[i] = parcel.bytes.size();
     MPI_Issend(&sizes[i], 1, MPI_UINT64_T, parcel.rank, size_tags[parity], raw, &size_sends[i]);
     in_pieces(parcel.bytes.size(), [&](std::size_t start, int count) {
-      MPI_Isend(parcel.bytes.data() + start, count, MPI_BYTE, parcel.rank, data_tags[parity], raw, &data.emplace_back());
+      MPI_Isend(parcel.bytes.data() + start, count, MPI_BYTE, parcel.rank, data_tags[parity], raw,
+                &data.emplace_back());
     });
   }
 

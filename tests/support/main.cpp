@@ -11,7 +11,9 @@ namespace malleus::test {
 namespace {
 const Communicator* world_pointer = nullptr;
 }
-const Communicator& world() { return *world_pointer; }
+const Communicator& world() {
+  return *world_pointer;
+}
 }  // namespace malleus::test
 
 int main(int argc, char** argv) {

@@ -19,7 +19,9 @@ TEST(SparseExchange, EachRankHearsFromThoseThatNameIt) {
   EXPECT_EQ(received.at(previous), (std::vector<int>{previous, 7}));
 }
 
-TEST(SparseExchange, SilenceIsAllowed) { EXPECT_TRUE(sparse_exchange<int>(world(), {}).empty()); }
+TEST(SparseExchange, SilenceIsAllowed) {
+  EXPECT_TRUE(sparse_exchange<int>(world(), {}).empty());
+}
 
 TEST(SparseExchange, ManyRoundsInARowStayApart) {
   for (int round = 0; round < 200; ++round) {
