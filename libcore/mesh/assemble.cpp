@@ -10,6 +10,7 @@
 #include "mesh/faces.hpp"
 #include "mesh/simplex.hpp"
 #include "mesh/space_filling_curve.hpp"
+#include "parallel/agreement.hpp"
 #include "parallel/sparse_exchange.hpp"
 
 namespace malleus {
@@ -379,7 +380,7 @@ AssembledMesh assemble_mesh(const Communicator& comm, const MeshPiece& piece) {
   const std::vector<LocalId> order = curve_order(comm, piece);
   std::vector<LocalId> element_nodes = ordered_elements(piece, order);
   std::vector<LocalId> neighbours;
-  neighbours = element_neighbours(piece.dim, piece.nodes(), element_nodes);
+  agree(comm, [&] { neighbours = element_neighbours(piece.dim, piece.nodes(), element_nodes); });
   const Sharing sharing = find_sharing(comm, piece, element_nodes, neighbours);
   Numbering numbering = number_nodes(comm, piece, element_nodes, sharing);
 
