@@ -1,0 +1,61 @@
+#pragma once
+
+/// The linear system of a Stokes step, as the linear solver gets it.
+
+#include <petscmat.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fem/node_constraints.hpp"
+#include "mesh/mesh.hpp"
+
+namespace malleus {
+
+/// One more scalar unknown q (the pressure of a flow-rate gate, of a closed pocket): a column g over the velocities
+/// and the row g^T. Same number of columns, in the same order, on all ranks.
+struct BorderColumn {
+  std::vector<LocalId> nodes;  ///< owned nodes where g is not zero, increasing
+  std::vector<Real> values;    ///< [node of `nodes`][dim], scaled and projected on the free directions
+  Real diagonal = 0;  ///< <= 0: entry of the unknown's own row (compressible pocket), scaled; same on all ranks
+};
+
+/// Unknowns and equations of a linear solve.
+///
+///     [ A   B^T  g ] [dv]   [r_v]      A symmetric positive on the free directions (viscous, friction, penalty)
+///     [ B   -C   0 ] [dp] = [r_p]      B = -(q, div v): r_p in m^3/s times the scale
+///     [ g^T  0   d ] [dq]   [r_q]      C from the condensed bubble, >= 0
+///
+/// `matrix` holds [A B^T; B -C] in blocks of dim+1 a node, (v_1..v_dim, p): MATSEQBAIJ on one rank, MATMPIBAIJ on
+/// several. Rows and columns are the global node numbers of the mesh; a rank has the rows of the nodes it owns.
+/// Pressures are scaled: the unknowns are p/s and q/s, s = `pressure_scale` [Pa.s/m]; so B, g carry s and C carries
+/// s^2, all entries are of the size of A's, and the norm of a residual weighs force and volume alike.
+/// Fixed directions: A = P A' P + (I - P) d, B = B' P (see NodeConstraints), in global axes; right sides and solutions
+/// have no part along them. Nodes that touch no modelled element are fully fixed, with -d in the pressure's row.
+struct LinearSystem {
+  const Communicator* comm = nullptr;
+  const Mesh* mesh = nullptr;                    ///< for coordinates (rigid modes), elements, halo
+  Mat matrix = nullptr;                          ///< not owned
+  const NodeConstraints* constraints = nullptr;  ///< of the mesh's local nodes: owned, then copies
+  std::span<const Real> element_viscosity;       ///< [element] Pa.s; 0 = not modelled, adds nothing to the matrix
+  std::span<const Real> element_volume;          ///< [element] m^3; in axisymmetric scenes of the whole ring
+  std::vector<BorderColumn> borders;
+  Real pressure_scale = 1;
+  bool axisymmetric = false;
+  /// The pressure, with all q, is determined up to a constant: the null vector is 1 in every pressure that is not
+  /// fixed and in every border unknown. Right sides are then orthogonal to it up to rounding, or to quadrature.
+  bool pressure_is_free = false;
+  std::uint64_t pattern_version = 0;  ///< changes with mesh and couplings
+  std::uint64_t value_version = 0;    ///< changes with the entries
+
+  int block_size() const noexcept { return mesh->dim + 1; }
+};
+
+/// A right side or a solution: owned nodes, and the border unknowns (the same on all ranks).
+struct LinearVector {
+  std::vector<Real> nodes;    ///< [owned node][dim+1]
+  std::vector<Real> borders;  ///< [border]
+};
+
+}  // namespace malleus
