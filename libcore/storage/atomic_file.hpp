@@ -1,0 +1,19 @@
+#pragma once
+
+/// Small files that are whole or absent, whatever happens while they are written.
+
+#include <filesystem>
+#include <string>
+
+namespace malleus {
+
+/// Writes the text beside `path`, flushes it to the disk, and renames it into place. StorageError. Local.
+void write_file_atomically(const std::filesystem::path& path, const std::string& text);
+
+/// The directory and its parents, made where they do not exist. StorageError. Local.
+void make_directories(const std::filesystem::path& path);
+
+/// The whole text of a file. StorageError where it cannot be read. Local.
+std::string read_text_file(const std::filesystem::path& path);
+
+}  // namespace malleus
