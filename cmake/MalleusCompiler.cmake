@@ -18,8 +18,9 @@ add_library(malleus_settings INTERFACE)
 # predicates of the remesher rely on correctly rounded single operations.
 target_compile_options(malleus_settings INTERFACE
   -Wall -Wextra -Wshadow -Wpedantic -Werror -ffp-contract=off
-  -Wno-array-bounds -Wno-stringop-overflow  # false alarms of GCC 12 in optimised standard algorithms
-  -Wno-maybe-uninitialized)                 # and in its own AVX-512 intrinsics (GCC bug 105593)
+  # False alarms of GCC 12: in optimised standard algorithms, in its own AVX-512 intrinsics (GCC bug 105593),
+  # and on "text" + string (GCC bug 105651).
+  -Wno-array-bounds -Wno-stringop-overflow -Wno-maybe-uninitialized -Wno-restrict)
 if(MALLEUS_NATIVE)
   target_compile_options(malleus_settings INTERFACE -march=native)
 endif()

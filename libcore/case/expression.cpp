@@ -1,0 +1,160 @@
+#include "case/expression.hpp"
+
+#include <fmt/format.h>
+#include <muParser.h>
+
+#include <cfenv>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/text.hpp"
+
+namespace malleus {
+namespace {
+
+constexpr std::size_t longest_formula = 4000;
+constexpr int deepest_nesting = 100;
+
+/// Formulas may divide by zero: their results are tested afterwards, so traps rest meanwhile.
+class TrapsAtRest {
+ public:
+  TrapsAtRest() { std::feholdexcept(&environment_); }
+  TrapsAtRest(const TrapsAtRest&) = delete;
+  TrapsAtRest& operator=(const TrapsAtRest&) = delete;
+  ~TrapsAtRest() { std::fesetenv(&environment_); }
+
+ private:
+  std::fenv_t environment_ = {};
+};
+
+std::string fault_at(std::string_view text, std::size_t position, std::string_view what) {
+  return fmt::format("expression '{}' is not understood at letter {}: {}", text, position + 1, what);
+}
+
+/// muParser takes `x = 3` for an assignment and `1, 2` for two formulas; neither has a meaning here.
+void refuse_foreign_syntax(std::string_view text) {
+  if (text.size() > longest_formula) {
+    throw InputError(fmt::format("expression of {} letters; at most {} are allowed", text.size(), longest_formula));
+  }
+  int depth = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char before = i > 0 ? text[i - 1] : ' ';
+    const char after = i + 1 < text.size() ? text[i + 1] : ' ';
+    const bool compares = before == '=' || before == '<' || before == '>' || before == '!' || after == '=';
+    if (text[i] == '=' && !compares) throw InputError(fault_at(text, i, "'=' assigns; compare with '=='"));
+    if (text[i] == ',' && depth == 0) throw InputError(fault_at(text, i, "',' outside a function's arguments"));
+    if (text[i] == '"') throw InputError(fault_at(text, i, "a quote"));
+    if (text[i] == '(') ++depth;
+    if (text[i] == ')') --depth;
+    if (depth > deepest_nesting) throw InputError(fault_at(text, i, "parentheses nested too deep"));
+  }
+}
+
+}  // namespace
+
+/// The compiled text and the variables it reads.
+class Expression::Formula {
+ public:
+  explicit Formula(const std::string& text) {
+    parser_.DefineVar("x", &x_);
+    parser_.DefineVar("y", &y_);
+    parser_.DefineVar("z", &z_);
+    parser_.DefineVar("t", &t_);
+    parser_.DefineConst("pi", std::numbers::pi);
+    parser_.DefineConst("e", std::numbers::e);
+    parser_.SetExpr(text);
+    try {
+      parser_.Eval();
+      for (const auto& [name, address] : parser_.GetUsedVar()) (name == "t" ? uses_time_ : uses_position_) = true;
+    } catch (const mu::Parser::exception_type& error) {
+      throw InputError(describe(text, error));
+    }
+  }
+
+  Real value(Real x, Real y, Real z, Real t) {
+    x_ = x;
+    y_ = y;
+    z_ = z;
+    t_ = t;
+    return parser_.Eval();
+  }
+
+  bool uses_position() const { return uses_position_; }
+  bool uses_time() const { return uses_time_; }
+
+ private:
+  std::string describe(const std::string& text, const mu::Parser::exception_type& error) const {
+    const bool is_placed = error.GetPos() >= 0 && static_cast<std::size_t>(error.GetPos()) <= text.size();
+    const std::size_t position = is_placed ? static_cast<std::size_t>(error.GetPos()) : 0;
+    const std::string token = error.GetToken();
+    if (error.GetCode() != mu::ecUNASSIGNABLE_TOKEN) return fault_at(text, position, error.GetMsg());
+    std::vector<std::string> known = {"x", "y", "z", "t"};
+    for (const auto& [name, value] : parser_.GetConst()) known.push_back(name);
+    for (const auto& [name, function] : parser_.GetFunDef()) known.push_back(name);
+    const std::string hint = did_you_mean(token, known);
+    const std::string allowed = hint.empty() ? "; known are x, y, z, t, pi, e and muParser's functions" : hint;
+    return fault_at(text, position, fmt::format("unknown '{}'{}", token, allowed));
+  }
+
+  mu::Parser parser_;
+  Real x_ = 0;
+  Real y_ = 0;
+  Real z_ = 0;
+  Real t_ = 0;
+  bool uses_position_ = false;
+  bool uses_time_ = false;
+};
+
+Expression::Expression(Real constant) : text_(format_real(constant)), constant_(constant) {}
+
+Expression Expression::parse(std::string_view text) {
+  const std::string formula_text(trim(text));
+  if (formula_text.empty()) throw InputError("an empty expression");
+  refuse_foreign_syntax(formula_text);
+  const TrapsAtRest rest;
+  const auto formula = std::make_shared<Formula>(formula_text);
+  Expression result;
+  result.text_ = formula_text;
+  if (formula->uses_position() || formula->uses_time()) {
+    result.formula_ = formula;
+    return result;
+  }
+  result.constant_ = formula->value(0, 0, 0, 0);
+  if (!std::isfinite(result.constant_)) {
+    throw InputError(fmt::format("expression '{}' gives no finite number", formula_text));
+  }
+  return result;
+}
+
+bool Expression::depends_on_position() const {
+  return formula_ != nullptr && formula_->uses_position();
+}
+
+bool Expression::depends_on_time() const {
+  return formula_ != nullptr && formula_->uses_time();
+}
+
+Real Expression::operator()(const std::array<Real, 3>& point, Real time) const {
+  if (formula_ == nullptr) return constant_;
+  const TrapsAtRest rest;
+  return formula_->value(point[0], point[1], point[2], time);
+}
+
+void Expression::evaluate(std::span<const Real> coordinates, int dimension, Real time, std::span<Real> values) const {
+  check(dimension >= 1 && dimension <= 3, "expressions are of one to three coordinates");
+  const auto stride = static_cast<std::size_t>(dimension);
+  check(coordinates.size() == values.size() * stride, "coordinates and values of an expression do not match");
+  if (formula_ == nullptr) {
+    std::fill(values.begin(), values.end(), constant_);
+    return;
+  }
+  const TrapsAtRest rest;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Real* point = coordinates.data() + i * stride;
+    values[i] = formula_->value(point[0], stride > 1 ? point[1] : 0, stride > 2 ? point[2] : 0, time);
+  }
+}
+
+}  // namespace malleus
