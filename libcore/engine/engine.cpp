@@ -1,0 +1,355 @@
+#include "engine/engine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "base/error.hpp"
+#include "base/log.hpp"
+#include "engine/report.hpp"
+#include "engine/resources.hpp"
+#include "parallel/agreement.hpp"
+#include "storage/atomic_file.hpp"
+
+namespace malleus {
+namespace {
+
+constexpr int most_cuts = 12;           ///< of one increment's step, each to a half
+constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
+constexpr Real wall_time_margin = 1.3;  ///< times the longest checkpoint, kept free before the wall time ends
+
+std::vector<std::string> engine_columns() {
+  return {"increment", "time_s", "dt_s", "nodes", "elements", "ranks", "volume_m3", "linear_iterations", "wall_s"};
+}
+
+}  // namespace
+
+Engine::Engine(const Communicator& comm, Process& process, RunSettings settings)
+    : comm_(comm),
+      process_(process),
+      settings_(std::move(settings)),
+      results_(comm, settings_.directory, settings_.case_name, settings_.precision),
+      checkpoints_(comm, settings_.directory),
+      started_at_(wall_clock()) {}
+
+template <class Work>
+auto Engine::timed(const std::string& name, Work work) {
+  struct Stopwatch {
+    Timing& timing;
+    Real began = wall_clock();
+    ~Stopwatch() {
+      ++timing.calls;
+      timing.wall_s += wall_clock() - began;
+    }
+  } stopwatch{timing(name)};
+  return work();
+}
+
+Engine::Timing& Engine::timing(const std::string& name) {
+  const auto found = std::find_if(timings_.begin(), timings_.end(), [&](const Timing& t) { return t.name == name; });
+  if (found != timings_.end()) return *found;
+  return timings_.emplace_back(Timing{name, 0, 0});
+}
+
+Real Engine::wall_s() const {
+  return wall_of_earlier_legs_ + wall_clock() - started_at_;
+}
+
+int Engine::run() {
+  timings_.reserve(64);  // references to entries stay valid
+  check_field_order();
+  print_plan();
+  if (settings_.check_only) return exit_code::done;
+  open_outputs();
+  if (settings_.increments && *settings_.increments == 0) return solve_once();
+  return run_increments();
+}
+
+void Engine::check_field_order() {
+  std::set<std::string> known;
+  for (const Component* component : process_.components()) {
+    for (const std::string& name : component->uses().starts) known.insert(name);
+  }
+  for (const Component* component : process_.components()) {
+    const FieldUse use = component->uses();
+    for (const std::string& name : use.reads) {
+      const std::string message =
+          fmt::format("component '{}' reads '{}', which no earlier one writes", component->name(), name);
+      check(known.contains(name), message.c_str());
+    }
+    known.insert(use.writes.begin(), use.writes.end());
+  }
+}
+
+void Engine::print_plan() {
+  report::print_plan(process_, settings_, comm_);
+}
+
+void Engine::open_outputs() {
+  on_root(comm_, [&] { make_directories(settings_.directory); });
+  if (settings_.restart && try_restart()) return;
+  if (settings_.restart) log::info("no checkpoint under {}: starting anew", settings_.directory.string());
+  start_anew();
+}
+
+void Engine::start_anew() {
+  on_root(comm_, [&] {
+    log::open_file(settings_.directory / "run.log", false);
+    std::error_code ignored;
+    for (const char* name : {"summary.json", "stop"}) std::filesystem::remove(settings_.directory / name, ignored);
+    write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);
+  });
+  report::print_heading(process_, settings_, comm_);
+  checkpoints_.remove_all();
+  results_.start_anew();
+  std::vector<std::string> columns = engine_columns();
+  for (std::string& name : process_.history_columns()) columns.push_back(std::move(name));
+  history_ = History::anew(comm_, settings_.directory / "history.csv", columns);
+  for (Component* component : process_.components()) {
+    timed(component->name(), [&] { component->start(); });
+  }
+}
+
+bool Engine::try_restart() {
+  std::optional<SavedState> saved = checkpoints_.read_newest();
+  if (!saved) return false;
+  on_root(comm_, [&] {
+    log::open_file(settings_.directory / "run.log", true);
+    write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);
+  });
+  const nlohmann::json& state = saved->state.at("engine");
+  last_ = {state.at("increment"), state.at("time"), state.at("dt")};
+  next_dt_limit_ = state.at("dt_limit").is_null() ? std::numeric_limits<Real>::infinity() : Real(state.at("dt_limit"));
+  wall_of_earlier_legs_ = state.at("wall_s");
+  first_increment_ = last_.number;
+  last_checkpoint_ = last_.number;
+  last_output_ = state.at("last_output");
+  process_.restore(std::move(saved->mesh), std::move(saved->fields), saved->state.at("process"));
+  results_.resume_after(last_.number);
+  std::vector<std::string> columns = engine_columns();
+  for (std::string& name : process_.history_columns()) columns.push_back(std::move(name));
+  history_ = History::resumed(comm_, settings_.directory / "history.csv", columns, last_.number);
+  log::info("restarted after increment {} at {:.6g} s", last_.number, last_.time);
+  return true;
+}
+
+int Engine::solve_once() {
+  for (Component* component : process_.components()) {
+    const Outcome outcome = timed(component->name(), [&] { return component->solve_once(); });
+    if (outcome.kind == Outcome::Kind::done) continue;
+    end_reason_ = component->name() + ": " + outcome.why;
+    finish("failed", exit_code::numerics);
+    return exit_code::numerics;
+  }
+  record(last_);
+  finish("done", exit_code::done);
+  return exit_code::done;
+}
+
+int Engine::run_increments() {
+  if (last_output_ < 0) write_fields(last_.number);
+  while (!is_over()) {
+    if (const std::string reason = reason_to_stop(); !reason.empty()) {
+      end_reason_ = reason;
+      if (last_checkpoint_ != last_.number || last_.number == 0) write_checkpoint();
+      finish("stopped", exit_code::checkpointed);
+      return exit_code::checkpointed;
+    }
+    if (const auto failure = make_increment()) {
+      end_reason_ = *failure;
+      if (last_checkpoint_ != last_.number) write_checkpoint();
+      finish("failed", exit_code::numerics);
+      return exit_code::numerics;
+    }
+    if (checkpoint_is_due()) write_checkpoint();
+  }
+  const bool more_to_come = settings_.more_increments && end_reason_ == "--steps";
+  if (more_to_come && last_checkpoint_ != last_.number) write_checkpoint();
+  finish("done", exit_code::done);
+  return exit_code::done;
+}
+
+bool Engine::is_over() {
+  if (const auto why = process_.finished()) end_reason_ = *why;
+  if (end_reason_.empty() && settings_.increments && last_.number >= *settings_.increments) end_reason_ = "increments";
+  if (end_reason_.empty() && last_.time >= settings_.end * (1 - 1e-12)) end_reason_ = "end time";
+  if (end_reason_.empty() && settings_.more_increments &&
+      last_.number - first_increment_ >= *settings_.more_increments) {
+    end_reason_ = "--steps";
+  }
+  return !end_reason_.empty();
+}
+
+/// The step is what the case and the physics allow, shortened so that the end is met in equal steps.
+Increment Engine::next_increment() {
+  Real dt = std::min({settings_.step, process_.largest_step(), next_dt_limit_});
+  const Real remaining = settings_.end - last_.time;
+  if (std::isfinite(remaining)) {
+    dt = std::isfinite(dt) ? remaining / std::max(1.0, std::ceil(remaining / dt - 1e-9)) : remaining;
+  }
+  if (!std::isfinite(dt)) throw InputError("[time]: nothing limits the step: give [time] step or end");
+  if (!(dt > 0)) throw Defect("the next step is not positive", std::source_location::current());
+  return {last_.number + 1, last_.time + dt, dt};
+}
+
+/// One increment, tried with smaller steps where components ask for it. The reason of a final failure.
+std::optional<std::string> Engine::make_increment() {
+  Increment increment = next_increment();
+  for (int cut = 0;; ++cut) {
+    const Outcome outcome = try_increment(increment);
+    if (outcome.kind == Outcome::Kind::done) {
+      next_dt_limit_ = cut > 0 || std::isfinite(next_dt_limit_) ? increment.dt * growth_after_cut
+                                                                : std::numeric_limits<Real>::infinity();
+      last_ = increment;
+      record(increment);
+      return std::nullopt;
+    }
+    if (outcome.kind == Outcome::Kind::failed || cut == most_cuts) return outcome.why;
+    log::info("increment {}: {}; the step is cut to {:.3g} s", increment.number, outcome.why, increment.dt / 2);
+    increment.dt /= 2;
+    increment.time = last_.time + increment.dt;
+  }
+}
+
+Outcome Engine::try_increment(const Increment& increment) {
+  std::vector<Component*> done;
+  for (Component* component : process_.components()) {
+    const Outcome outcome = timed(component->name(), [&] { return component->advance(increment); });
+    if (outcome.kind == Outcome::Kind::done) {
+      done.push_back(component);
+      continue;
+    }
+    for (auto undone = done.rbegin(); undone != done.rend(); ++undone) (*undone)->roll_back();
+    return {outcome.kind, component->name() + ": " + outcome.why};
+  }
+  return Outcome::done();
+}
+
+void Engine::record(const Increment& increment) {
+  const Mesh& mesh = process_.mesh();
+  std::vector<HistoryCell> row = {static_cast<Real>(increment.number),
+                                  increment.time,
+                                  increment.dt,
+                                  static_cast<Real>(mesh.total_nodes()),
+                                  static_cast<Real>(mesh.total_elements),
+                                  static_cast<Real>(comm_.size()),
+                                  process_.volume(),
+                                  static_cast<Real>(process_.linear_totals().iterations),
+                                  std::round(wall_s() * 1e3) / 1e3};
+  for (const HistoryCell& cell : process_.history_row()) row.push_back(cell);
+  timed("history", [&] { history_->append(row); });
+  print_increment(increment);
+  if (increment.number % settings_.output_every == 0) write_fields(increment.number);
+}
+
+void Engine::print_increment(const Increment& increment) {
+  const Real done = std::isfinite(settings_.end) ? increment.time / settings_.end : 0;
+  const Real by_count =
+      settings_.increments ? Real(increment.number) / Real(std::max<GlobalId>(*settings_.increments, 1)) : 0;
+  const Real share = std::clamp(std::max(done, by_count), 0.0, 1.0);
+  const std::string eta = share > 0 ? report::duration(wall_s() * (1 - share) / share) : "-";
+  log::info("{:6} | t {:.5g} s | dt {:.3g} s | {} | {:.1f} s | {:.0f} % | left {}", increment.number, increment.time,
+            increment.dt, process_.increment_note(), wall_s(), 100 * share, eta);
+}
+
+void Engine::write_fields(GlobalId increment) {
+  timed("output", [&] {
+    process_.refresh_outputs();
+    const std::vector<std::string> names =
+        settings_.output_fields.empty() ? process_.output_fields() : settings_.output_fields;
+    std::vector<const Field*> fields;
+    for (const std::string& name : names) {
+      if (process_.fields().has(name)) fields.push_back(&process_.fields()[name]);
+    }
+    results_.write(increment, last_.time, process_.mesh(), fields);
+  });
+  last_output_ = increment;
+}
+
+bool Engine::checkpoint_is_due() const {
+  if (settings_.checkpoint_every_increments &&
+      last_.number - last_checkpoint_ >= *settings_.checkpoint_every_increments) {
+    return true;
+  }
+  const bool by_time = wall_s() - last_checkpoint_wall_ >= settings_.checkpoint_every_wall_s;
+  return comm_.broadcast(by_time);
+}
+
+void Engine::write_checkpoint() {
+  const Real began = wall_clock();
+  timed("checkpoint", [&] {
+    nlohmann::json state;
+    state["engine"] = {{"increment", last_.number},
+                       {"time", last_.time},
+                       {"dt", last_.dt},
+                       {"dt_limit", std::isfinite(next_dt_limit_) ? nlohmann::json(next_dt_limit_) : nlohmann::json()},
+                       {"wall_s", wall_s()},
+                       {"last_output", last_output_}};
+    state["process"] = process_.save_state();
+    checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state);
+  });
+  last_checkpoint_ = last_.number;
+  last_checkpoint_wall_ = wall_s();
+  longest_checkpoint_s_ = std::max(longest_checkpoint_s_, wall_clock() - began);
+}
+
+std::string Engine::reason_to_stop() {
+  std::string reason = stop_.asked(comm_, settings_.directory);
+  if (!reason.empty()) return reason;
+  const Real needed = wall_clock() - started_at_ + wall_time_margin * longest_checkpoint_s_;
+  if (comm_.broadcast(needed > settings_.wall_time_limit_s)) return "[limits] wall_time";
+  if (std::isfinite(settings_.memory_limit_bytes)) {
+    const auto memory = static_cast<Real>(comm_.sum(current_memory_bytes()));
+    if (memory > settings_.memory_limit_bytes) {
+      return fmt::format("[limits] memory ({:.0f} MiB in use)", memory / 1048576);
+    }
+  }
+  return "";
+}
+
+void Engine::finish(const std::string& status, int code) {
+  if (last_output_ != last_.number || code == exit_code::numerics) write_fields(last_.number);
+  write_summary(status, code);
+  print_timings();
+  for (const std::string& line : process_.closing_lines()) log::info("{}", line);
+  const Forecast forecast = process_.forecast();
+  if (code == exit_code::done && last_.number > 0) {
+    log::info("took {:.1f} s and {:.0f} MiB; the forecast was {:.1f} s and {:.0f} MiB", wall_s(),
+              static_cast<Real>(comm_.sum(peak_memory_bytes())) / 1048576, forecast.wall_s,
+              forecast.memory_bytes / 1048576);
+  }
+  log::info("{} ({}): results in {}", status, end_reason_.empty() ? "solved" : end_reason_,
+            settings_.directory.string());
+  if (code == exit_code::numerics && comm_.is_root()) {
+    fmt::print(stderr, "error: {}\nThe last good state is that of increment {}, in {}\n", end_reason_, last_.number,
+               (settings_.directory / (settings_.case_name + ".xdmf")).string());
+  }
+}
+
+void Engine::print_timings() {
+  std::vector<report::ComponentTime> rows;
+  for (const Timing& t : timings_) rows.push_back({t.name, t.calls, t.wall_s});
+  report::print_timings(comm_, rows, wall_clock() - started_at_);
+}
+
+void Engine::write_summary(const std::string& status, int code) {
+  std::vector<report::ComponentTime> rows;
+  for (const Timing& t : timings_) rows.push_back({t.name, t.calls, t.wall_s});
+  nlohmann::json summary = report::summary(comm_, process_, settings_, rows);
+  summary["status"] = status;
+  summary["exit_code"] = code;
+  summary["reason"] = end_reason_;
+  summary["increments"] = last_.number;
+  summary["wall_s"] = wall_s();
+  nlohmann::json final_row = nlohmann::json::object();
+  for (std::size_t i = 0; i < history_->last_row().size(); ++i) {
+    const HistoryCell& cell = history_->last_row()[i];
+    final_row[history_->columns()[i]] = cell ? nlohmann::json(*cell) : nlohmann::json();
+  }
+  summary["final"] = final_row;
+  on_root(comm_, [&] { write_file_atomically(settings_.directory / "summary.json", summary.dump(2) + "\n"); });
+}
+
+}  // namespace malleus

@@ -1,0 +1,55 @@
+#include "engine/stop_request.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+
+#include "base/error.hpp"
+
+namespace malleus {
+namespace {
+
+volatile std::sig_atomic_t received_signal = 0;
+constexpr std::array<int, 4> stop_signals = {SIGUSR1, SIGUSR2, SIGTERM, SIGINT};
+constexpr GlobalId stop_file = 1000;
+
+void on_signal(int number) {
+  if (received_signal != 0) _exit(exit_code::checkpointed);
+  received_signal = number;
+}
+
+std::string signal_name(GlobalId number) {
+  switch (number) {
+    case SIGUSR1:
+      return "SIGUSR1";
+    case SIGUSR2:
+      return "SIGUSR2";
+    case SIGTERM:
+      return "SIGTERM";
+    default:
+      return "SIGINT";
+  }
+}
+
+}  // namespace
+
+StopRequest::StopRequest() {
+  received_signal = 0;
+  for (const int number : stop_signals) std::signal(number, on_signal);
+}
+
+StopRequest::~StopRequest() {
+  for (const int number : stop_signals) std::signal(number, SIG_DFL);
+}
+
+std::string StopRequest::asked(const Communicator& comm, const std::filesystem::path& directory) const {
+  GlobalId mine = received_signal;
+  std::error_code ignored;
+  if (comm.is_root() && mine == 0 && std::filesystem::remove(directory / "stop", ignored)) mine = stop_file;
+  const GlobalId asked = comm.max(mine);
+  if (asked == 0) return "";
+  return asked == stop_file ? "file 'stop' found" : "signal " + signal_name(asked);
+}
+
+}  // namespace malleus

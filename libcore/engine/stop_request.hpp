@@ -1,0 +1,26 @@
+#pragma once
+
+/// Requests from outside to end a run early.
+
+#include <filesystem>
+#include <string>
+
+#include "parallel/communicator.hpp"
+
+namespace malleus {
+
+/// From its construction SIGUSR1, SIGUSR2, SIGTERM and SIGINT ask for a stop at the end of the increment; a second
+/// one ends the process at once. One per process.
+class StopRequest {
+ public:
+  StopRequest();
+  ~StopRequest();
+  StopRequest(const StopRequest&) = delete;
+  StopRequest& operator=(const StopRequest&) = delete;
+
+  /// The reason to stop, the same on all ranks; empty where there is none. Looks for a file `stop` in the directory
+  /// too (and removes it). Collective.
+  std::string asked(const Communicator& comm, const std::filesystem::path& directory) const;
+};
+
+}  // namespace malleus
