@@ -6,6 +6,7 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(ZLIB REQUIRED)
 pkg_check_modules(PETSC REQUIRED IMPORTED_TARGET PETSc)
 pkg_check_modules(MUPARSER REQUIRED IMPORTED_TARGET muparser)
 set(HDF5_PREFER_PARALLEL ON)
@@ -19,5 +20,5 @@ target_include_directories(malleus_dependencies SYSTEM INTERFACE
   ${MPI_CXX_INCLUDE_DIRS} ${HDF5_C_INCLUDE_DIRS} ${PETSC_INCLUDE_DIRS} ${MUPARSER_INCLUDE_DIRS}
   ${EIGEN3_INCLUDE_DIRS})
 target_link_libraries(malleus_dependencies INTERFACE
-  MPI::MPI_CXX Eigen3::Eigen CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json
+  MPI::MPI_CXX Eigen3::Eigen CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json ZLIB::ZLIB
   PkgConfig::PETSC PkgConfig::MUPARSER ${HDF5_C_LIBRARIES})

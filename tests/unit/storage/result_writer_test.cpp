@@ -9,35 +9,15 @@
 #include "storage/atomic_file.hpp"
 #include "storage/h5_file.hpp"
 #include "support/box_mesh.hpp"
+#include "support/scratch_directory.hpp"
 #include "support/world.hpp"
 
 namespace malleus {
 namespace {
 
+using test::ScratchDirectory;
 using test::world;
 namespace fs = std::filesystem;
-
-/// A directory of this test run alone, known to all ranks, removed at the end.
-class ScratchDirectory {
- public:
-  ScratchDirectory() {
-    std::string name;
-    if (world().is_root()) {
-      std::string pattern = (fs::temp_directory_path() / "malleus-test-XXXXXX").string();
-      name = mkdtemp(pattern.data());
-    }
-    world().broadcast(name);
-    path_ = name;
-  }
-  ~ScratchDirectory() {
-    world().barrier();
-    if (world().is_root()) fs::remove_all(path_);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 struct Scene {
   Mesh mesh;
