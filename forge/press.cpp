@@ -1,0 +1,140 @@
+#include "forge/press.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.hpp"
+
+namespace malleus::forge {
+namespace {
+
+/// A blow is over when this share of the starting speed is left (1e-6 of the energy).
+constexpr Real spent_speed = 1e-3;
+/// Largest relative change of the speed in a step of a hammer.
+constexpr Real speed_change = 0.1;
+
+}  // namespace
+
+Real StrokeTable::position(Real time) const {
+  if (time <= times.front()) return positions.front();
+  if (time >= times.back()) return positions.back();
+  const auto after = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
+  const Real share = (time - times[after - 1]) / (times[after] - times[after - 1]);
+  return positions[after - 1] + share * (positions[after] - positions[after - 1]);
+}
+
+Press::Press(PressSpec spec) : spec_(std::move(spec)) {
+  if (has_inertia()) state_.speed = std::sqrt(2 * spec_.energy / spec_.mass);
+  if (spec_.kind == PressKind::hydraulic) state_.allowed_speed = std::numeric_limits<Real>::max();
+}
+
+/// Height of the ram above the bottom dead centre at the angle a from it: r (1 - cos a) + l - sqrt(l^2 - r^2 sin^2 a).
+Real Press::crank_drop(Real time) const {
+  const Real r = spec_.crank_radius;
+  const Real l = spec_.rod_length;
+  const auto height = [&](Real angle) {
+    const Real side = r * std::sin(angle);
+    return r * (1 - std::cos(angle)) + l - std::sqrt(l * l - side * side);
+  };
+  const Real start_rod =
+      l + r - spec_.start_height;  // distance of pin and ram's joint from the shaft, by the cosine law
+  const Real cosine = (start_rod * start_rod + r * r - l * l) / (2 * r * start_rod);
+  const Real start_angle = std::acos(std::clamp(cosine, -1.0, 1.0));
+  return spec_.start_height - height(start_angle - spec_.rotation_speed * time);
+}
+
+Real Press::speed(Real time) const {
+  switch (spec_.kind) {
+    case PressKind::speed:
+      return spec_.speed(time);
+    case PressKind::hydraulic:
+      return std::min(spec_.speed(time), state_.allowed_speed);
+    case PressKind::hammer:
+    case PressKind::screw:
+      return state_.stopped ? 0 : state_.speed;
+    case PressKind::stroke_table: {
+      const Real tiny = 1e-9 * (spec_.table.times.back() - spec_.table.times.front());
+      return (spec_.table.position(time + tiny) - spec_.table.position(time)) / tiny;
+    }
+    case PressKind::crank: {
+      const Real tiny = 1e-6 / spec_.rotation_speed;
+      return (crank_drop(time + tiny) - crank_drop(time - tiny)) / (2 * tiny);
+    }
+  }
+  return 0;
+}
+
+Real Press::travel(Real time, const Displacement& displacement) const {
+  switch (spec_.kind) {
+    case PressKind::stroke_table:
+      return spec_.table.position(time + displacement.step) - spec_.table.position(time);
+    case PressKind::crank:
+      return crank_drop(time + displacement.step) - crank_drop(time);
+    case PressKind::hammer:
+    case PressKind::screw:
+      return state_.stopped
+                 ? 0
+                 : displacement.step * (displacement.now * state_.speed + displacement.before * state_.last_speed);
+    case PressKind::speed:  // Simpson's rule: exact for speeds up to the third power of time
+      return displacement.step / 6 *
+             (spec_.speed(time) + 4 * spec_.speed(time + 0.5 * displacement.step) +
+              spec_.speed(time + displacement.step));
+    case PressKind::hydraulic:
+      return displacement.step * (displacement.now * speed(time) + displacement.before * state_.last_speed);
+  }
+  return 0;
+}
+
+bool Press::accepts(Real force, Real time, Real tolerance) {
+  if (spec_.kind != PressKind::hydraulic) return true;
+  const Real speed_now = speed(time);
+  const bool is_limited = state_.allowed_speed < spec_.speed(time);
+  if (!is_limited && force <= spec_.force_limit * (1 + tolerance)) return true;
+  if (is_limited && std::abs(force - spec_.force_limit) <= tolerance * spec_.force_limit) return true;
+  if (!(force > 0)) {  // nothing resists: full speed
+    state_.allowed_speed = std::numeric_limits<Real>::max();
+    has_trial_ = false;
+    return !is_limited;
+  }
+  Real exponent = 0.3;  // d ln F / d ln w, of a usual material until two speeds were tried
+  if (has_trial_ && trial_speed_ != speed_now && trial_force_ > 0) {
+    exponent = std::clamp(std::log(force / trial_force_) / std::log(speed_now / trial_speed_), 0.02, 2.0);
+  }
+  trial_force_ = force;
+  trial_speed_ = speed_now;
+  has_trial_ = true;
+  const Real factor = std::pow(spec_.force_limit / force, 1 / exponent);
+  state_.allowed_speed = speed_now * std::clamp(factor, 1e-3, 1e3);
+  return false;
+}
+
+void Press::commit(Real force, Real time, const Displacement& displacement) {
+  const Real way = travel(time, displacement);
+  state_.stroke += way;
+  has_trial_ = false;
+  if (!has_inertia()) {
+    state_.last_speed = speed(time);
+    state_.speed = state_.last_speed;
+  } else if (!state_.stopped) {
+    const Real first_speed = std::sqrt(2 * spec_.energy / spec_.mass);
+    const Real mean_force = displacement.now * force + displacement.before * state_.last_force;
+    state_.last_speed = state_.speed;
+    state_.speed -= displacement.step * mean_force / spec_.mass;
+    if (state_.speed < spent_speed * first_speed) {
+      state_.stopped = true;
+      state_.speed = 0;
+    }
+  }
+  if (spec_.kind == PressKind::stroke_table) {
+    state_.stopped = time + (1 + 1e-9) * displacement.step >= spec_.table.times.back();
+  }
+  state_.last_force = force;
+}
+
+Real Press::step_limit(Real force) const {
+  if (!has_inertia() || state_.stopped || !(force > 0)) return std::numeric_limits<Real>::max();
+  return speed_change * spec_.mass * state_.speed / force;
+}
+
+}  // namespace malleus::forge
