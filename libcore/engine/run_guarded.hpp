@@ -1,0 +1,21 @@
+#pragma once
+
+/// The outermost frame of every executable: MPI and PETSc, and how errors leave the program.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "parallel/communicator.hpp"
+
+namespace malleus {
+
+/// Arguments without the program's name and without what follows `--` (that goes to PETSc). Returns the exit code.
+using Program = std::function<int(const Communicator& comm, const std::vector<std::string>& arguments)>;
+
+/// Starts MPI and PETSc, runs the program and returns its exit code. An Error that all ranks raise alike is printed
+/// once, by the root, as "error: ..."; one that a single rank met ends all ranks with its message and code. A Defect,
+/// or any foreign exception, is printed with its rank and ends all ranks with exit code 1.
+int run_guarded(int argc, char** argv, const Program& program);
+
+}  // namespace malleus
