@@ -52,6 +52,7 @@ struct Key {
   bool is_required = false;
   bool has_levels = false;
   bool is_vector = false;
+  bool is_only_in_3d = false;
   Reference reference = Reference::none;
   std::string referred_section;
   PathRule path_rule = PathRule::none;
@@ -144,6 +145,11 @@ class KeyOf {
   }
   KeyOf& names_surface_group() {
     key_->reference = Reference::surface_group;
+    return *this;
+  }
+  /// A mistake where the mesh has two dimensions.
+  KeyOf& only_in_3d() {
+    key_->is_only_in_3d = true;
     return *this;
   }
   /// For paths: must exist before the run.

@@ -91,6 +91,7 @@ void CaseReader::note_references(const Section& section, const Key& key, const C
     const std::filesystem::path given(without_quotes(entry.value));
     needed_paths_.push_back({entry.place, subject, key.path_rule, given.is_absolute() ? given : directory() / given});
   }
+  if (key.is_only_in_3d) given_vectors_.push_back({entry.place, subject, 0});
   if (key.is_vector && key.components > 0) given_vectors_.push_back({entry.place, subject, key.components});
 }
 
@@ -230,9 +231,12 @@ void CaseReader::check_mesh(const MeshNames& mesh) {
                                            value.name, kind, hint));
   }
   for (const GivenVector& vector : given_vectors_) {
-    if (vector.components == mesh.dimension) continue;
-    mistakes_.add(vector.place, fmt::format("{}: {} components, but the mesh has {} dimensions", vector.subject,
-                                            vector.components, mesh.dimension));
+    const bool fits = vector.components == 0 ? mesh.dimension == 3 : vector.components == mesh.dimension;
+    if (fits) continue;
+    const std::string what =
+        vector.components == 0 ? "a third component" : fmt::format("{} components", vector.components);
+    mistakes_.add(vector.place,
+                  fmt::format("{}: {}, but the mesh has {} dimensions", vector.subject, what, mesh.dimension));
   }
   mistakes_.throw_if_any(file_.path());
 }

@@ -145,7 +145,7 @@ class CaseReader {
   struct GivenVector {
     Place place;
     std::string subject;
-    int components = 0;
+    int components = 0;  ///< 0: a key that belongs to a third component
   };
 
   void describe(std::string_view kind, Occurrence occurrence, int at_least, std::string_view text,

@@ -106,7 +106,8 @@ KeyOf<Expression> Section::expression(std::string_view name, std::optional<Expre
 void Section::expressions(std::string_view name, std::array<std::optional<Expression>, 3>& members,
                           std::string_view unit, std::string_view text) {
   for (std::size_t i = 0; i < members.size(); ++i) {
-    expression(fmt::format("{}_{}", name, "xyz"[i]), members[i], unit, text);
+    auto key = expression(fmt::format("{}_{}", name, "xyz"[i]), members[i], unit, text);
+    if (i == 2) key.only_in_3d();
   }
 }
 
