@@ -1,0 +1,85 @@
+#include "engine/command_line.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+#include <mpi.h>
+#include <petscversion.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "base/error.hpp"
+
+namespace malleus {
+namespace {
+
+struct OptionTexts {
+  const char* after =
+      "What follows -- goes to PETSc's options database (-- -ksp_view, say).\n"
+      "Exit codes: 0 done, 2 wrong input, 3 the numerics failed, 4 the disk failed,\n"
+      "85 stopped with a checkpoint (run again with --restart).";
+};
+
+void add_options(CLI::App& app, CommandLine& line) {
+  app.add_option("CASE.ini", line.case_file, "The case file");
+  app.add_option("-o,--output", line.output, "Directory for all files (default: [output] directory, else ./out/NAME)")
+      ->type_name("DIR");
+  app.add_option("-D,--set", line.overrides, "Overrides one key of the case; repeatable; wins over the file")
+      ->type_name("SECTION.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_flag("--check", line.check, "Reads and validates all, prints the plan, runs nothing");
+  app.add_flag("--restart", line.restart, "Goes on from the newest complete checkpoint of the output directory");
+  app.add_option("--steps", line.steps, "Stops cleanly after N more increments")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--help-case", line.help_case, "Prints every section and key of a case, or those of one section")
+      ->type_name("[SECTION]")
+      ->expected(0, 1)
+      ->default_str("");
+  app.add_flag("--template", line.print_template, "Prints a commented starter case");
+  app.add_flag("--quiet", line.quiet, "Prints warnings and errors alone");
+  app.add_flag("--verbose", line.verbose, "Prints details of the solvers too");
+  app.set_help_flag("-h,--help", "Prints this");
+}
+
+}  // namespace
+
+std::string version_text(const std::string& program) {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  int length = 0;
+  MPI_Get_library_version(mpi, &length);
+  const std::string mpi_text(mpi, static_cast<std::size_t>(length));
+  return fmt::format("{} {} (PETSc {}.{}.{}, HDF5 {}.{}.{}, {}, GCC {})", program, MALLEUS_VERSION, PETSC_VERSION_MAJOR,
+                     PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR, major, minor, release,
+                     mpi_text.substr(0, mpi_text.find(',')), __VERSION__);
+}
+
+CommandLine parse_command_line(const std::string& program, const std::string& description,
+                               const std::vector<std::string>& arguments) {
+  CommandLine line;
+  CLI::App app(description, program);
+  app.footer(OptionTexts().after);
+  bool version = false;
+  add_options(app, line);
+  app.add_flag("--version", version, "Prints version and libraries");
+  try {
+    std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+    app.parse(reversed);
+  } catch (const CLI::CallForHelp&) {
+    line.answer = app.help();
+    return line;
+  } catch (const CLI::ParseError& error) {
+    throw InputError(fmt::format("command line: {} (see {} --help)", error.what(), program));
+  }
+  if (version) line.answer = version_text(program);
+  const bool needs_no_case = !line.answer.empty() || line.help_case || line.print_template;
+  if (line.case_file.empty() && !needs_no_case) {
+    throw InputError(
+        fmt::format("command line: the case file is missing: {} [options] CASE.ini (see {} --help)", program, program));
+  }
+  return line;
+}
+
+}  // namespace malleus

@@ -1,0 +1,101 @@
+#include "engine/simulator.hpp"
+
+#include <fmt/format.h>
+
+#include "base/error.hpp"
+#include "base/log.hpp"
+#include "case/help.hpp"
+#include "engine/command_line.hpp"
+#include "engine/engine.hpp"
+#include "engine/run_guarded.hpp"
+#include "mesh/msh_reader.hpp"
+
+namespace malleus {
+namespace {
+
+std::string level_name(Level level) {
+  switch (level) {
+    case Level::draft:
+      return "draft";
+    case Level::standard:
+      return "standard";
+    case Level::fine:
+      return "fine";
+    case Level::reference:
+      return "reference";
+  }
+  return "";
+}
+
+/// Prints what was asked for instead of a run; whether anything was.
+bool answer_questions(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
+  std::string answer = line.answer;
+  if (answer.empty() && (line.help_case || line.print_template)) {
+    CaseReader reader;
+    simulator.describe(reader);
+    answer = line.print_template ? template_text(reader, simulator.program()) : help_text(reader, *line.help_case);
+  }
+  if (answer.empty()) return false;
+  if (comm.is_root()) fmt::print("{}\n", answer);
+  return true;
+}
+
+std::filesystem::path output_directory(const CommandLine& line, const CommonSections& common) {
+  if (!line.output.empty()) return line.output;
+  if (!common.output.directory.empty()) return common.output.directory;
+  return std::filesystem::path("out") / common.case_settings.name;
+}
+
+RunSettings run_settings(const CommandLine& line, Simulator& simulator) {
+  const CommonSections& common = simulator.common();
+  const TimeSettings& time = simulator.time();
+  RunSettings settings;
+  settings.program = simulator.program();
+  settings.case_name = common.case_settings.name;
+  settings.directory = output_directory(line, common);
+  settings.level = level_name(common.accuracy.level);
+  if (time.end) settings.end = *time.end;
+  if (time.step) settings.step = *time.step;
+  if (time.increments) settings.increments = *time.increments;
+  settings.output_every = common.output.every;
+  settings.precision = common.output.precision == Precision::float64 ? ResultWriter::Precision::float64
+                                                                     : ResultWriter::Precision::float32;
+  settings.output_fields = common.output.fields;
+  settings.checkpoint_every_increments = common.checkpoint.every.increments;
+  if (common.checkpoint.every.seconds) settings.checkpoint_every_wall_s = *common.checkpoint.every.seconds;
+  if (common.limits.wall_time) settings.wall_time_limit_s = *common.limits.wall_time;
+  if (common.limits.memory) settings.memory_limit_bytes = *common.limits.memory;
+  settings.more_increments = line.steps;
+  settings.restart = line.restart;
+  settings.check_only = line.check;
+  return settings;
+}
+
+int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
+  CommonSections& common = simulator.common();
+  common.case_settings.name = line.case_file.stem().string();
+  CaseReader reader(comm, CaseFile::read(comm, line.case_file, line.overrides));
+  simulator.describe(reader);
+  reader.finish();
+  Mesh mesh = build_mesh(comm, read_msh(comm, common.mesh.file, common.mesh.length_scale()));
+  reader.check_mesh({mesh.dim, mesh.region_names, mesh.group_names});
+  RunSettings settings = run_settings(line, simulator);
+  const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
+  settings.resolved_case = reader.resolved(settings.directory);
+  return Engine(comm, *process, std::move(settings)).run();
+}
+
+}  // namespace
+
+int run_simulator(int argc, char** argv, Simulator& simulator) {
+  return run_guarded(argc, argv, [&](const Communicator& comm, const std::vector<std::string>& arguments) {
+    const CommandLine line = parse_command_line(simulator.program(), simulator.description(), arguments);
+    log::start(comm.is_root(), line.quiet     ? log::Level::quiet
+                               : line.verbose ? log::Level::verbose
+                                              : log::Level::normal);
+    if (answer_questions(comm, line, simulator)) return exit_code::done;
+    return run_case(comm, line, simulator);
+  });
+}
+
+}  // namespace malleus
