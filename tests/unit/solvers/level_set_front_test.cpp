@@ -1,0 +1,135 @@
+#include <gtest/gtest.h>
+
+#include "level_set_cases.hpp"
+#include "solvers/facet_distance.hpp"
+#include "solvers/level_set_redistance.hpp"
+#include "solvers/level_set_wetting.hpp"
+
+namespace malleus {
+namespace {
+
+using test::at_nodes;
+using test::position_of;
+using test::world;
+
+Mesh unit_mesh(int dim, int cells) {
+  return test::box_mesh(world(), {dim, {cells, cells, cells}, {0, 0, 0}, {1, 1, 1}, 0.2});
+}
+
+TEST(FacetDistance, ToASingleSegmentAndTriangleIsExactEverywhere) {
+  for (const int dim : {2, 3}) {
+    const Mesh mesh = unit_mesh(dim, 6);
+    const NodeGraph graph = build_node_graph(mesh);
+    DistanceFacet facet;
+    facet.vertices = dim == 2 ? std::array<Real, 9>{0.2, 0.3, 0.4, 0.3}
+                              : std::array<Real, 9>{0.2, 0.3, 0.5, 0.4, 0.3, 0.5, 0.2, 0.5, 0.5};
+    std::vector<DistanceFacet> facets;
+    if (mesh.elements() > 0 && world().rank() == 0) facets.push_back(facet);
+    const auto distance = distance_to_facets(world(), mesh, graph, facets);
+    for (LocalId n = 0; n < mesh.nodes(); ++n) {
+      const Real* x = mesh.point(n);
+      const Real exact =
+          dim == 2 ? (closest_point<2>(Eigen::Map<Eigen::Matrix2d>(facet.vertices.data()), {x[0], x[1]}) -
+                      Point<2>(x[0], x[1]))
+                         .norm()
+                   : (closest_point<3>(Eigen::Map<Eigen::Matrix3d>(facet.vertices.data()), {x[0], x[1], x[2]}) -
+                      Point<3>(x[0], x[1], x[2]))
+                         .norm();
+      EXPECT_NEAR(distance[static_cast<std::size_t>(n)], exact, 1e-14);
+    }
+  }
+}
+
+TEST(Redistance, MakesADistanceOfADistortedSphereAndKeepsItsVolume) {
+  for (const int dim : {2, 3}) {
+    const Mesh mesh = unit_mesh(dim, 16);
+    const NodeGraph graph = build_node_graph(mesh);
+    const auto measures = element_measures(mesh, false);
+    const Sphere sphere = {{0.5, 0.5, dim == 3 ? 0.5 : 0}, 0.3};
+    auto level_set = at_nodes(mesh, [&](const Position& x) { return 20 * signed_distance(sphere, x) * (2 + x[0]); });
+    const Real volume = positive_volume(world(), mesh, measures, level_set);
+    EXPECT_TRUE(should_redistance(front_slope(world(), mesh, level_set)));
+    redistance(world(), mesh, graph, measures, level_set);
+    EXPECT_NEAR(positive_volume(world(), mesh, measures, level_set), volume, 1e-13);
+    const FrontSlope slope = front_slope(world(), mesh, level_set);
+    EXPECT_FALSE(should_redistance(slope));
+    EXPECT_GT(slope.smallest, 0.6);
+    EXPECT_LT(slope.largest, 1.7);
+    for (LocalId n = 0; n < mesh.nodes(); ++n) {
+      EXPECT_NEAR(level_set[static_cast<std::size_t>(n)], signed_distance(sphere, position_of(mesh, n)), 0.35 / 16);
+    }
+  }
+}
+
+TEST(Redistance, OfAPlaneThroughTheNodesKeepsIt) {
+  const Mesh mesh = test::box_mesh(world(), {3, {4, 4, 4}, {0, 0, 0}, {1, 1, 1}, 0});
+  const NodeGraph graph = build_node_graph(mesh);
+  auto level_set = at_nodes(mesh, [](const Position& x) { return 5 * (0.5 - x[0]); });
+  redistance(world(), mesh, graph, element_measures(mesh, false), level_set);
+  for (LocalId n = 0; n < mesh.nodes(); ++n) {
+    EXPECT_NEAR(level_set[static_cast<std::size_t>(n)], 0.5 - mesh.point(n)[0], 1e-8);
+  }
+}
+
+TEST(Redistance, DoesNothingWithoutAFront) {
+  const Mesh mesh = unit_mesh(2, 4);
+  const NodeGraph graph = build_node_graph(mesh);
+  auto level_set = at_nodes(mesh, [](const Position& x) { return 7 + x[0]; });
+  const auto before = level_set;
+  redistance(world(), mesh, graph, element_measures(mesh, false), level_set);
+  EXPECT_EQ(level_set, before);
+  EXPECT_FALSE(should_redistance(front_slope(world(), mesh, level_set)));
+}
+
+/// Marks of the planes y = 0 and y = 1.
+std::vector<char> side_walls(const Mesh& mesh) {
+  std::vector<char> is_wall;
+  for (LocalId n = 0; n < mesh.nodes(); ++n) {
+    const Real y = mesh.point(n)[1];
+    is_wall.push_back(y < 1e-12 || y > 1 - 1e-12 ? 1 : 0);
+  }
+  return is_wall;
+}
+
+TEST(Wetting, AWallNodeTakesTheValueOfItsNearestInteriorNode) {
+  const Mesh mesh = test::box_mesh(world(), {2, {8, 8, 1}, {0, 0, 0}, {1, 1, 0}, 0});
+  const NodeGraph graph = build_node_graph(mesh);
+  const WallWetting wetting(world(), mesh, graph, side_walls(mesh));
+  EXPECT_EQ(wetting.nodes_without_interior(), 0);
+  auto level_set = at_nodes(mesh, [](const Position& x) { return x[0] + 10 * x[1]; });
+  wetting.apply(level_set);
+  for (LocalId n = 0; n < mesh.nodes(); ++n) {
+    const Real y = std::min(std::max(mesh.point(n)[1], 0.125), 0.875);
+    EXPECT_NEAR(level_set[static_cast<std::size_t>(n)], mesh.point(n)[0] + 10 * y, 1e-14);
+  }
+}
+
+TEST(Wetting, ReachesNodesWithoutAnInteriorNeighbour) {
+  // All nodes of the lower half lie on the wall: values arrive from above, row by row.
+  const Mesh mesh = test::box_mesh(world(), {2, {4, 8, 1}, {0, 0, 0}, {1, 1, 0}, 0});
+  const NodeGraph graph = build_node_graph(mesh);
+  std::vector<char> is_wall;
+  for (LocalId n = 0; n < mesh.nodes(); ++n) is_wall.push_back(mesh.point(n)[1] < 0.51 ? 1 : 0);
+  const WallWetting wetting(world(), mesh, graph, is_wall);
+  EXPECT_EQ(wetting.nodes_without_interior(), 4 * 5);
+  auto level_set = at_nodes(mesh, [](const Position& x) { return x[0] + 10 * x[1]; });
+  wetting.apply(level_set);
+  for (LocalId n = 0; n < mesh.nodes(); ++n) {
+    EXPECT_NEAR(level_set[static_cast<std::size_t>(n)], mesh.point(n)[0] + 10 * std::max(mesh.point(n)[1], 0.625),
+                1e-14);
+  }
+}
+
+TEST(Wetting, WithoutAnyInteriorNodeNothingIsGiven) {
+  const Mesh mesh = unit_mesh(2, 2);
+  const NodeGraph graph = build_node_graph(mesh);
+  const std::vector<char> is_wall(static_cast<std::size_t>(mesh.nodes()), 1);
+  const WallWetting wetting(world(), mesh, graph, is_wall);
+  auto level_set = at_nodes(mesh, [](const Position& x) { return x[0]; });
+  const auto before = level_set;
+  wetting.apply(level_set);
+  EXPECT_EQ(level_set, before);
+}
+
+}  // namespace
+}  // namespace malleus
