@@ -1,0 +1,125 @@
+#include <algorithm>
+
+#include "remesh/operators.hpp"
+
+namespace malleus::remeshing {
+namespace {
+
+/// Height of the regular simplex of unit edges.
+template <int D>
+constexpr Real unit_height = D == 3 ? 0.81649658092772603 : 0.86602540378443865;
+
+/// Vector normal to a face (edge in 2D), towards the inside.
+Point<3> inward_normal(const std::array<const Point<3>*, 3>& x) {
+  return cross(difference<3>(*x[1], *x[0]), difference<3>(*x[2], *x[0]));
+}
+Point<2> inward_normal(const std::array<const Point<2>*, 2>& x) {
+  const Point<2> e = difference<2>(*x[1], *x[0]);
+  return {-e[1], e[0]};
+}
+
+template <int D>
+Point<D> times(const Symmetric<D>& m, const Point<D>& v) {
+  Point<D> result{};
+  for (int i = 0; i < D; ++i) {
+    for (int j = 0; j < D; ++j) result[static_cast<std::size_t>(i)] += m[packed(i, j)] * v[static_cast<std::size_t>(j)];
+  }
+  return result;
+}
+
+}  // namespace
+
+/// Weighted mean of the places where v would make each element at it regular with unit edges in v's metric; bad
+/// elements weigh more. The height over a face with Euclidean normal n is along inv(M) n.
+template <int D, class Metric>
+Point<D> Operators<D, Metric>::ideal_position(LocalId v) const {
+  const auto inverse = mesh_.metric(v).inverse();
+  Point<D> sum{};
+  Real weights = 0;
+  for (const LocalId e : cavity_.elements()) {
+    const Element<D>& element = mesh_.element(e);
+    const std::size_t at = element.index_of(v);
+    std::array<const Point<D>*, D> x;
+    for (std::size_t k = 0; k < D; ++k) x[k] = &mesh_.point(element.node[FaceTable<D>::nodes[at][k]]);
+    const Point<D> normal = inward_normal(x);
+    Point<D> along;
+    Real height = 0;
+    if constexpr (Metric::is_tensor) {
+      along = times<D>(inverse, normal);
+      height = unit_height<D> / std::sqrt(dot(normal, along));
+    } else {
+      along = normal;
+      height = unit_height<D> * std::sqrt(inverse[0] / dot(normal, normal));
+    }
+    Real weight = 1 / (0.05 + std::max(0.0F, element.key));
+    weight *= weight;
+    weights += weight;
+    for (std::size_t i = 0; i < D; ++i) {
+      Real centre = 0;
+      for (const auto* corner : x) centre += (*corner)[i];
+      sum[i] += weight * (centre / D + height * along[i]);
+    }
+  }
+  for (Real& value : sum) value /= weights;
+  return sum;
+}
+
+/// Moves v there if the worst key of its elements gains, or stays while their sum gains.
+template <int D, class Metric>
+bool Operators<D, Metric>::try_site(LocalId v, const Site<D, Metric>& site, Real worst, Real total) {
+  const Point<D> old_point = mesh_.point(v);
+  const Metric old_metric = mesh_.metric(v);
+  mesh_.point(v) = site.position;
+  mesh_.metric(v) = site.metric;
+  const auto elements = cavity_.elements();
+  keys_.resize(elements.size());
+  Real new_worst = 2;
+  Real new_total = 0;
+  for (std::size_t n = 0; n < elements.size() && new_worst > 0.9 * worst; ++n) {
+    const Real key = mesh_.key_of_element(mesh_.element(elements[n]));
+    keys_[n] = static_cast<float>(key);
+    new_worst = std::min(new_worst, key);
+    new_total += key;
+  }
+  const bool better = new_worst > 1.0005 * worst || (new_worst >= 0.999 * worst && new_total > 1.001 * total);
+  if (!better) {
+    mesh_.point(v) = old_point;
+    mesh_.metric(v) = old_metric;
+    return false;
+  }
+  Vertex& vertex = mesh_.vertex(v);
+  vertex.input_element = site.input_element;
+  vertex.input_face = site.input_face;
+  for (std::size_t n = 0; n < elements.size(); ++n) mesh_.element(elements[n]).key = keys_[n];
+  return true;
+}
+
+template <int D, class Metric>
+bool Operators<D, Metric>::relocate(LocalId v) {
+  if (mesh_.vertex(v).frozen || mesh_.vertex(v).dimension == 0 || !cavity_.gather_ball(v)) return false;
+  Real worst = 2;
+  Real total = 0;
+  for (const LocalId e : cavity_.elements()) {
+    worst = std::min<Real>(worst, mesh_.element(e).key);
+    total += mesh_.element(e).key;
+  }
+  if (worst <= 0) return false;
+  const Point<D> from = mesh_.point(v);
+  const Point<D> wanted = ideal_position(v);
+  Real step = 1;
+  for (int attempt = 0; attempt < 3; ++attempt, step *= 0.5) {
+    const Site<D, Metric> site = background_.site_for(v, between<D>(from, wanted, step));
+    if (!try_site(v, site, worst, total)) continue;
+    ++counts.moves;
+    for (const LocalId e : cavity_.elements()) enlist(e, pending::swap | pending::length);
+    return true;
+  }
+  return false;
+}
+
+template class Operators<2, SizeMetric<2>>;
+template class Operators<2, TensorMetric<2>>;
+template class Operators<3, SizeMetric<3>>;
+template class Operators<3, TensorMetric<3>>;
+
+}  // namespace malleus::remeshing

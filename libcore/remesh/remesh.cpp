@@ -1,0 +1,77 @@
+#include "remesh/remesh.hpp"
+
+#include <ctime>
+#include <numbers>
+
+#include "remesh/build.hpp"
+#include "remesh/remesher.hpp"
+
+namespace malleus {
+namespace {
+
+using namespace remeshing;
+
+template <int D, class VertexMetric>
+void set_metrics(const Metric& metric, WorkingMesh<D, VertexMetric>& mesh) {
+  mesh.metrics.resize(mesh.points.size());
+  const auto& values = metric.values();
+  for (std::size_t v = 0; v < mesh.metrics.size(); ++v) {
+    if constexpr (VertexMetric::is_tensor) {
+      const auto n = static_cast<std::size_t>(symmetric_size<D>);
+      mesh.metrics[v] = VertexMetric::from_metric(std::span(values).subspan(v * n, n));
+    } else {
+      const Real size = metric.kind() == Metric::Kind::uniform ? values[0] : values[v];
+      const Real inverse_square = 1 / (size * size);
+      mesh.metrics[v] = VertexMetric::from_metric(std::span(&inverse_square, 1));
+    }
+  }
+}
+
+template <int D, class VertexMetric>
+void set_keys(WorkingMesh<D, VertexMetric>& mesh) {
+  for (auto& element : mesh.elements) element.key = static_cast<float>(mesh.key_of_element(element));
+}
+
+template <int D, class VertexMetric>
+RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOptions& options) {
+  const auto start = std::clock();
+  RemeshReport report;
+  WorkingMesh<D, VertexMetric> mesh;
+  BuildNotes notes;
+  build_elements(input, mesh, notes);
+  set_metrics(metric, mesh);
+  classify(input, options.feature_angle * std::numbers::pi / 180, mesh, notes);
+  set_keys(mesh);
+  report.nodes_before = input.nodes();
+  report.elements_before = input.elements();
+  report.volume_before = signed_volume(input);
+  report.unmatched_facets = notes.unmatched_facets;
+  report.unused_nodes = notes.unused_nodes;
+  input = {};
+  report.before = assess(mesh);
+  report.phases.push_back({"build", static_cast<Real>(std::clock() - start) / CLOCKS_PER_SEC});
+  Remesher<D, VertexMetric>(mesh, options).run(report);
+  const auto finish = std::clock();
+  report.after = assess(mesh);
+  input = to_arrays(mesh);
+  report.nodes_after = input.nodes();
+  report.elements_after = input.elements();
+  report.volume_after = signed_volume(input);
+  report.phases.push_back({"report", static_cast<Real>(std::clock() - finish) / CLOCKS_PER_SEC});
+  return report;
+}
+
+}  // namespace
+
+RemeshReport remesh(RemeshMesh& mesh, const Metric& metric, const RemeshOptions& options) {
+  check_arrays(mesh);
+  check_metric(mesh, metric);
+  const bool tensors = metric.kind() == Metric::Kind::tensors;
+  if (mesh.dimension == 2)
+    return tensors ? remesh_with<2, TensorMetric<2>>(mesh, metric, options)
+                   : remesh_with<2, SizeMetric<2>>(mesh, metric, options);
+  return tensors ? remesh_with<3, TensorMetric<3>>(mesh, metric, options)
+                 : remesh_with<3, SizeMetric<3>>(mesh, metric, options);
+}
+
+}  // namespace malleus

@@ -1,0 +1,224 @@
+#include "remesh/remesher.hpp"
+
+#include <algorithm>
+#include <ctime>
+
+namespace malleus::remeshing {
+namespace {
+
+Real processor_seconds() {
+  return static_cast<Real>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+template <int D, class Metric>
+struct EdgeExtremes {
+  Real longest = -1, shortest = 1e300;
+  std::size_t longest_edge = 0, shortest_edge = 0;
+
+  EdgeExtremes(const WorkingMesh<D, Metric>& mesh, const Element<D>& element) {
+    for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
+      const auto [a, b] = EdgeTable<D>::nodes[edge];
+      const Real length = mesh.squared_length_of(element.node[a], element.node[b]);
+      if (length > longest) {
+        longest = length;
+        longest_edge = edge;
+      }
+      if (length < shortest) {
+        shortest = length;
+        shortest_edge = edge;
+      }
+    }
+  }
+};
+
+}  // namespace
+
+template <int D, class Metric>
+void Remesher<D, Metric>::timed(const char* phase, const std::function<void()>& work) {
+  const Real start = processor_seconds();
+  work();
+  const Real seconds = processor_seconds() - start;
+  for (auto& known : phases_) {
+    if (known.name == phase) {
+      known.seconds += seconds;
+      return;
+    }
+  }
+  phases_.push_back({phase, seconds});
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::enlist_all() {
+  for (std::size_t e = 0; e < mesh_.elements.size(); ++e) {
+    if (mesh_.elements[e].is_live()) operators_.enlist(static_cast<LocalId>(e), pending::swap | pending::length);
+  }
+  for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
+    if (mesh_.vertices[v].element >= 0) operators_.enlist_vertex(static_cast<LocalId>(v));
+  }
+}
+
+/// Renumbers, and makes the lists anew in the new order.
+template <int D, class Metric>
+void Remesher<D, Metric>::renumber_all() {
+  renumber(mesh_);
+  operators_.swap_list.clear();
+  operators_.length_list.clear();
+  operators_.move_list.clear();
+  for (std::size_t e = 0; e < mesh_.elements.size(); ++e) {
+    if ((mesh_.elements[e].waits & pending::swap) != 0) operators_.swap_list.push_back(static_cast<LocalId>(e));
+    if ((mesh_.elements[e].waits & pending::length) != 0) operators_.length_list.push_back(static_cast<LocalId>(e));
+  }
+  for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) {
+    if (mesh_.vertices[v].waits) operators_.move_list.push_back(static_cast<LocalId>(v));
+  }
+}
+
+template <int D, class Metric>
+Real Remesher<D, Metric>::longest_waiting() const {
+  Real longest = 0;
+  for (const LocalId e : operators_.length_list) {
+    if (mesh_.element(e).is_live())
+      longest = std::max(longest, EdgeExtremes<D, Metric>(mesh_, mesh_.element(e)).longest);
+  }
+  return longest;
+}
+
+/// Splits the longest edge of each listed element if it is above the threshold. Elements with edges that are long or
+/// short by the limits stay on the list.
+template <int D, class Metric>
+void Remesher<D, Metric>::split_pass(Real threshold) {
+  std::vector<LocalId> list;
+  list.swap(operators_.length_list);
+  const Limits& limits = operators_.limits;
+  for (const LocalId e : list) {
+    mesh_.element(e).waits = static_cast<std::uint8_t>(mesh_.element(e).waits & ~pending::length);
+    if (!mesh_.element(e).is_live()) continue;
+    const EdgeExtremes<D, Metric> edges(mesh_, mesh_.element(e));
+    if (edges.longest > threshold && operators_.split(e, edges.longest_edge)) continue;
+    const bool later = edges.longest > limits.long_edge && edges.longest <= threshold;
+    if (later || edges.shortest < limits.short_edge) operators_.enlist(e, pending::length);
+  }
+}
+
+template <int D, class Metric>
+bool Remesher<D, Metric>::collapse_shortest(LocalId e, Real threshold) {
+  for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
+    const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
+    const LocalId b = mesh_.element(e).node[EdgeTable<D>::nodes[edge][1]];
+    if (mesh_.squared_length_of(a, b) >= threshold) continue;
+    if (operators_.collapse(a, b) || operators_.collapse(b, a)) return true;
+  }
+  return false;
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::collapse_pass(Real threshold) {
+  std::vector<LocalId> list;
+  list.swap(operators_.length_list);
+  for (const LocalId e : list) {
+    mesh_.element(e).waits = static_cast<std::uint8_t>(mesh_.element(e).waits & ~pending::length);
+    if (!mesh_.element(e).is_live() || collapse_shortest(e, threshold)) continue;
+    if (EdgeExtremes<D, Metric>(mesh_, mesh_.element(e)).longest > operators_.limits.long_edge)
+      operators_.enlist(e, pending::length);
+  }
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::swap_pass(Real key) {
+  std::vector<LocalId> list;
+  list.swap(operators_.swap_list);
+  for (const LocalId e : list) {
+    Element<D>& element = mesh_.element(e);
+    element.waits = static_cast<std::uint8_t>(element.waits & ~pending::swap);
+    if (element.is_live() && element.key < key) operators_.swap_at(e);
+  }
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::move_pass() {
+  std::vector<LocalId> list;
+  list.swap(operators_.move_list);
+  for (const LocalId v : list) {
+    mesh_.vertex(v).waits = false;
+    if (mesh_.vertex(v).element >= 0) operators_.relocate(v);
+  }
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::settle_sizes() {
+  const Limits& limits = operators_.limits;
+  for (int round = 0; round < options_.size_rounds; ++round) {
+    const OperationCounts before = operators_.counts;
+    const Real threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
+    timed("split", [&] { split_pass(threshold); });
+    timed("collapse", [&] { collapse_pass(0.45); });
+    timed("swap", [&] { swap_pass(quality_to_key<D>(0.63)); });
+    timed("move", [&] { move_pass(); });
+    timed("renumber", [&] { renumber_all(); });
+    const std::int64_t changes =
+        operators_.counts.splits - before.splits + operators_.counts.collapses - before.collapses;
+    if (threshold <= limits.long_edge && changes <= mesh_.count_vertices() / 1000) break;
+  }
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::improve() {
+  for (int round = 0; round < options_.improvement_rounds; ++round) {
+    enlist_all();
+    const bool last = round + 1 == options_.improvement_rounds;
+    timed("swap", [&] { swap_pass(quality_to_key<D>(0.766)); });
+    timed("collapse", [&] { collapse_pass(0.5); });
+    if (!last) timed("split", [&] { split_pass(operators_.limits.long_edge); });
+    timed("move", [&] { move_pass(); });
+  }
+}
+
+template <int D, class Metric>
+void Remesher<D, Metric>::run(RemeshReport& report) {
+  timed("renumber", [&] { renumber_all(); });
+  enlist_all();
+  settle_sizes();
+  improve();
+  timed("renumber", [&] { renumber_all(); });
+  report.splits = operators_.counts.splits;
+  report.collapses = operators_.counts.collapses;
+  report.swaps = operators_.counts.swaps;
+  report.moves = operators_.counts.moves;
+  report.phases.insert(report.phases.end(), phases_.begin(), phases_.end());
+}
+
+template <int D, class Metric>
+RemeshQuality assess(const WorkingMesh<D, Metric>& mesh) {
+  RemeshQuality quality;
+  Real sum = 0;
+  Real worst = 2;
+  std::vector<std::pair<std::uint64_t, bool>> edges;
+  for (const auto& element : mesh.elements) {
+    if (!element.is_live()) continue;
+    worst = std::min<Real>(worst, element.key);
+    sum += key_to_quality<D>(element.key);
+    if (element.key <= 0) ++quality.inverted;
+    for (const auto& [a, b] : EdgeTable<D>::nodes) {
+      const Real length = mesh.squared_length_of(element.node[a], element.node[b]);
+      edges.emplace_back(edge_key(element.node[a], element.node[b]), length >= 0.5 && length <= 2.0);
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  const auto good = std::count_if(edges.begin(), edges.end(), [](const auto& edge) { return edge.second; });
+  quality.minimum = worst > 0 ? key_to_quality<D>(worst) : worst;
+  quality.mean = mesh.count_elements() > 0 ? sum / mesh.count_elements() : 0;
+  quality.conforming = edges.empty() ? 1 : static_cast<Real>(good) / static_cast<Real>(edges.size());
+  return quality;
+}
+
+template class Remesher<2, SizeMetric<2>>;
+template class Remesher<2, TensorMetric<2>>;
+template class Remesher<3, SizeMetric<3>>;
+template class Remesher<3, TensorMetric<3>>;
+template RemeshQuality assess(const WorkingMesh<2, SizeMetric<2>>&);
+template RemeshQuality assess(const WorkingMesh<2, TensorMetric<2>>&);
+template RemeshQuality assess(const WorkingMesh<3, SizeMetric<3>>&);
+template RemeshQuality assess(const WorkingMesh<3, TensorMetric<3>>&);
+
+}  // namespace malleus::remeshing

@@ -1,0 +1,45 @@
+#pragma once
+
+/// The course of one remesh: which operation works on which list, and when.
+
+#include <functional>
+
+#include "remesh/operators.hpp"
+#include "remesh/remesh.hpp"
+
+namespace malleus::remeshing {
+
+template <int D, class Metric>
+class Remesher {
+ public:
+  Remesher(WorkingMesh<D, Metric>& mesh, const RemeshOptions& options)
+      : mesh_(mesh), options_(options), background_(mesh), operators_(mesh, background_) {}
+
+  /// Elements' keys and vertices' metrics must be set.
+  void run(RemeshReport& report);
+
+ private:
+  void settle_sizes();
+  void improve();
+  void enlist_all();
+  void renumber_all();
+  Real longest_waiting() const;
+  void split_pass(Real threshold);
+  void collapse_pass(Real threshold);
+  void swap_pass(Real key);
+  void move_pass();
+  bool collapse_shortest(LocalId element, Real threshold);
+  void timed(const char* phase, const std::function<void()>& work);
+
+  WorkingMesh<D, Metric>& mesh_;
+  const RemeshOptions& options_;
+  Background<D, Metric> background_;
+  Operators<D, Metric> operators_;
+  std::vector<RemeshPhase> phases_;
+};
+
+/// Quality of all elements and lengths of all edges.
+template <int D, class Metric>
+RemeshQuality assess(const WorkingMesh<D, Metric>& mesh);
+
+}  // namespace malleus::remeshing
