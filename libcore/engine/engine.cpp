@@ -110,6 +110,7 @@ void Engine::start_anew() {
   for (Component* component : process_.components()) {
     timed(component->name(), [&] { component->start(); });
   }
+  if (Probes* probes = process_.probes()) probes->start_anew(settings_.directory, process_.fields());
 }
 
 bool Engine::try_restart() {
@@ -128,6 +129,10 @@ bool Engine::try_restart() {
   last_output_ = state.at("last_output");
   process_.restore(std::move(saved->mesh), std::move(saved->fields), saved->state.at("process"));
   results_.resume_after(last_.number);
+  if (Probes* probes = process_.probes()) {
+    probes->set_places(state.at("probes").get<std::vector<std::vector<Real>>>());
+    probes->resume(settings_.directory, process_.fields(), last_.time);
+  }
   std::vector<std::string> columns = engine_columns();
   for (std::string& name : process_.history_columns()) columns.push_back(std::move(name));
   history_ = History::resumed(comm_, settings_.directory / "history.csv", columns, last_.number);
@@ -240,6 +245,9 @@ void Engine::record(const Increment& increment) {
                                   std::round(wall_s() * 1e3) / 1e3};
   for (const HistoryCell& cell : process_.history_row()) row.push_back(cell);
   timed("history", [&] { history_->append(row); });
+  if (Probes* probes = process_.probes()) {
+    timed("probes", [&] { probes->record(increment.time, process_.mesh(), process_.fields()); });
+  }
   print_increment(increment);
   if (increment.number % settings_.output_every == 0) write_fields(increment.number);
 }
@@ -287,6 +295,7 @@ void Engine::write_checkpoint() {
                        {"dt_limit", std::isfinite(next_dt_limit_) ? nlohmann::json(next_dt_limit_) : nlohmann::json()},
                        {"wall_s", wall_s()},
                        {"last_output", last_output_}};
+    if (const Probes* probes = process_.probes()) state["engine"]["probes"] = probes->places();
     state["process"] = process_.save_state();
     checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state);
   });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/component.hpp"
+#include "engine/probes.hpp"
 #include "field/field.hpp"
 #include "mesh/mesh.hpp"
 
@@ -66,6 +67,9 @@ class Process {
   virtual std::vector<HistoryCell> history_row() = 0;
   virtual Real volume() const = 0;  ///< m^3 of the mesh now (of the whole revolution; per metre in plane scenes)
   /// @}
+
+  /// The probes of the scene; null where it has none. The engine records them and keeps their places in checkpoints.
+  virtual Probes* probes() { return nullptr; }
 
   virtual std::string increment_note() const = 0;  ///< the process' part of the log line of an increment
   virtual LinearTotals linear_totals() const = 0;
