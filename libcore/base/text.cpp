@@ -92,19 +92,23 @@ std::optional<Real> take_real(std::string_view& text) {
 
 std::string nearest_name(std::string_view word, std::span<const std::string> known) {
   constexpr std::size_t longest_compared = 64;
+  constexpr std::size_t shortest_beginning = 3;
   if (word.size() > longest_compared) return {};
   const std::string lower = in_lower_case(word);
   std::string best;
+  std::string continued;
   std::size_t limit = 2 + word.size() / 3;
   for (const std::string& name : known) {
     if (name.size() > longest_compared) continue;
-    const std::size_t distance = edit_distance(lower, in_lower_case(name));
+    const std::string lower_name = in_lower_case(name);
+    if (continued.empty() && lower.size() >= shortest_beginning && lower_name.starts_with(lower)) continued = name;
+    const std::size_t distance = edit_distance(lower, lower_name);
     const bool shares_a_letter = distance < std::max(word.size(), name.size());
     if (distance >= limit || !shares_a_letter) continue;
     best = name;
     limit = distance;
   }
-  return best;
+  return best.empty() ? continued : best;
 }
 
 std::string did_you_mean(std::string_view word, std::span<const std::string> known) {

@@ -31,7 +31,8 @@ std::string format_real(Real value);
 std::optional<Real> take_real(std::string_view& text);
 
 /// The known name nearest to `word` in edit distance (insert, drop, change, swap of neighbours; letter case costs
-/// nothing), or empty where none is near: one letter and a third of them may differ.
+/// nothing): one letter and a third of them may differ. Else the first name that `word` begins. Empty where none is
+/// near.
 std::string nearest_name(std::string_view word, std::span<const std::string> known);
 
 /// "; did you mean 'x'?", or empty where no known name is near.

@@ -82,7 +82,7 @@ class UnitParser {
   }
 
   Unit product() {
-    Unit result = factor();
+    Unit result = rest_.starts_with('/') ? Unit{} : factor();  // `2.5 /s` is 2.5 1/s
     for (skip_blanks(); !rest_.empty() && rest_.front() != ')'; skip_blanks()) {
       const bool divide = take('/');
       if (!divide && !take('*')) take('.');

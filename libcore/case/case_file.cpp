@@ -209,12 +209,12 @@ void CaseFile::parse_line(std::string_view line, const Place& place) {
 }
 
 void CaseFile::add_override(const std::string& assignment) {
-  const Place place = {"-D " + shown(assignment), 0};
+  const Place place = {"command line", 0};
   const std::size_t equals = assignment.find('=');
   const std::string_view target = trim(std::string_view(assignment).substr(0, equals));
   const std::size_t dot = target.rfind('.');
   if (equals == std::string::npos || dot == std::string_view::npos || !is_name(target.substr(dot + 1))) {
-    mistakes_.add(place, "expected SECTION.KEY=VALUE");
+    mistakes_.add(place, fmt::format("-D {}: expected SECTION.KEY=VALUE", shown(assignment)));
     return;
   }
   const std::string_view title = target.substr(0, dot);
@@ -222,9 +222,13 @@ void CaseFile::add_override(const std::string& assignment) {
   const std::string kind(title.substr(0, inner));
   const std::string name(inner == std::string_view::npos ? "" : title.substr(inner + 1));
   const std::string key(target.substr(dot + 1));
-  const std::string value(trim(std::string_view(assignment).substr(equals + 1)));
+  std::string value(trim(std::string_view(assignment).substr(equals + 1)));
+  const bool is_unquoted = value.find('"') == std::string::npos;
+  if (without_comment(value) != value && is_unquoted)
+    value = fmt::format("\"{}\"", value);  // the shell took the quotes
   std::string fault = fault_of_value(value);
-  if (without_comment(value) != value || value.find('\n') != std::string::npos) fault = "holds a comment or a line end";
+  if (without_comment(value) != value) fault = "holds ; or # outside quotes";
+  if (value.find('\n') != std::string::npos) fault = "holds more than one line";
   if (!fault.empty()) mistakes_.add(place, fmt::format("[{}] {} {}", title, key, fault));
   auto section = std::find_if(sections_.begin(), sections_.end(),
                               [&](const CaseSection& s) { return s.kind == kind && s.name == name; });

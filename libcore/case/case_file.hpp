@@ -13,11 +13,11 @@ namespace malleus {
 
 /// Where something was written. Line 0: on the command line.
 struct Place {
-  std::string file;  ///< as the user named it, or `-D SECTION.KEY=VALUE`
+  std::string file;  ///< as the user named it
   int line = 0;
 
   bool is_command_line() const { return line == 0; }
-  std::string text() const;  ///< "case.ini:12"
+  std::string text() const;  ///< "case.ini:12", "command line"
 };
 
 /// A mistake of the user with its place.

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "base/error.hpp"
 #include "base/text.hpp"
 
@@ -13,6 +11,7 @@ namespace {
 std::string default_of(const Key& key) {
   if (key.is_required) return "required";
   if (key.has_levels) return fmt::format("{} (by level)", join(key.level_values, " / "));
+  if (!key.default_words.empty()) return key.default_words;
   return key.default_text.empty() ? "none" : key.default_text;
 }
 
@@ -29,9 +28,10 @@ std::string note_on(const SectionDescription& description) {
 }
 
 std::string help_of(const SectionDescription& description) {
-  std::string text = fmt::format("[{}]{}\n    {}\n", description.title(), note_on(description), description.text);
+  std::string text = fmt::format("[{}]{}: {}\n", description.title(), note_on(description), description.text);
   for (const Key& key : description.keys) {
-    text += fmt::format("  {} = {}; {}\n      {}\n", key.name, key.allowed(), default_of(key), key.text);
+    const std::string value = key.is_required ? "required" : "default: " + default_of(key);
+    text += fmt::format("  {:<20} {}; {}\n  {:<20} {}\n", key.name, key.allowed(), value, "", key.text);
   }
   return text;
 }
@@ -45,12 +45,9 @@ std::string in_table(std::string_view text) {
   return cell;
 }
 
-/// Whether the template shows the section ready for use.
+/// Whether the template shows the section ready for use: an empty section that is always in force changes nothing.
 bool is_active(const SectionDescription& description) {
-  if (description.occurrence == Occurrence::repeated) return description.at_least > 0;
-  const bool has_required =
-      std::any_of(description.keys.begin(), description.keys.end(), [](const Key& key) { return key.is_required; });
-  return description.occurrence == Occurrence::always && has_required;
+  return description.occurrence == Occurrence::always || description.at_least > 0;
 }
 
 std::string template_of(const SectionDescription& description) {

@@ -41,9 +41,10 @@ struct Key {
   std::string type;  ///< "number", "a | b", ...
   std::string unit;
   std::string text;
-  std::string starter;     ///< value in the template
-  std::string empty_word;  ///< written for "no value": auto, none, ...
-  std::string default_text;
+  std::string starter;        ///< value in the template
+  std::string empty_word;     ///< written for "no value": auto, none, ...
+  std::string default_text;   ///< as case text
+  std::string default_words;  ///< where the program works the default out
   std::array<std::string, n_levels> level_values;
   std::vector<std::string> choices;
   std::optional<Limit> lower;
@@ -119,6 +120,11 @@ class KeyOf {
   KeyOf& at_least(Real value) { return with_lower({value, true}); }
   KeyOf& below(Real value) { return with_upper({value, false}); }
   KeyOf& at_most(Real value) { return with_upper({value, true}); }
+  /// For keys whose default the program works out: how help calls it ("that of the case file").
+  KeyOf& default_is(std::string_view words) {
+    key_->default_words = words;
+    return *this;
+  }
   /// The default by `[accuracy] level`.
   KeyOf& by_level(const T& draft, const T& standard, const T& fine, const T& reference) {
     const std::array<const T*, n_levels> values = {&draft, &standard, &fine, &reference};

@@ -21,7 +21,8 @@ std::string moved_path(const std::string& value, const std::filesystem::path& ca
                        const std::filesystem::path& output_directory) {
   const std::filesystem::path given(without_quotes(value));
   if (given.is_absolute()) return value;
-  const auto from = std::filesystem::absolute(case_directory).lexically_normal();
+  const std::filesystem::path here = ".";
+  const auto from = std::filesystem::absolute(case_directory.empty() ? here : case_directory).lexically_normal();
   const auto to = std::filesystem::absolute(output_directory).lexically_normal();
   const auto target = (from / given).lexically_normal();
   const std::string moved = (lies_within(to, from) ? target.lexically_relative(to) : target).string();
@@ -54,12 +55,13 @@ std::string CaseReader::resolved(const std::filesystem::path& output_directory) 
       fmt::format("; Every key that was in force in {}, and where it came from.\n", file_.path().filename().string());
   std::string section;
   for (const InForce& item : in_force_) {
+    if (item.value.empty()) continue;
     if (item.section != section) text += fmt::format("\n[{}]\n", item.section);
     section = item.section;
     std::string value = item.value;
-    if (item.is_path && !value.empty()) value = moved_path(value, directory(), output_directory);
+    if (item.is_path) value = moved_path(value, directory(), output_directory);
     if (item.is_vector && !item.is_given && dimension_ == 2) value = without_third_component(value);
-    const std::string line = fmt::format("{}{} = {}", value.empty() ? "; " : "", item.key, value);
+    const std::string line = fmt::format("{} = {}", item.key, value);
     text += line;
     text.append(line.size() < column ? column - line.size() : 1, ' ');
     text += fmt::format(" ; {}\n", item.origin);

@@ -46,7 +46,7 @@ Converter<Interval> interval_converter() {
 }  // namespace
 
 void CaseSettings::describe(Section& s) {
-  s.string("name", name, "name of the output files; default: that of the case file");
+  s.string("name", name, "name of the output files").default_is("that of the case file");
   s.string("title", title, "a line for people");
   s.choice("geometry", geometry, {{"cartesian", Geometry::cartesian}, {"axisymmetric", Geometry::axisymmetric}},
            "a 2D mesh is plane strain, or is revolved about its y axis (x = r >= 0)");
@@ -72,7 +72,7 @@ Real MeshSettings::length_scale() const {
 
 void TimeSettings::describe(Section& s) {
   s.real("end", end, "s", "time at which the run ends").above(0);
-  s.real("step", step, "s", "largest increment; none: as large as accuracy and contact allow").above(0);
+  s.real("step", step, "s", "largest increment").above(0).default_is("as large as accuracy and contact allow");
   s.integer("increments", increments, "number of increments after which the run ends").at_least(0);
 }
 
@@ -107,7 +107,7 @@ void SolverSettings::describe(Section& s) {
 
 void RemeshSettings::describe(Section& s) {
   s.flag("active", active, "no: keeps the section in the file but does not remesh");
-  s.real("size", size, "m", "edge length; none: the input's local size").above(0);
+  s.real("size", size, "m", "edge length").above(0).default_is("the input's local size");
   s.real("min_size", min_size, "m", "smallest edge length").above(0);
   s.real("max_size", max_size, "m", "largest edge length").above(0);
   s.count("nodes", nodes, "target count of nodes").at_least(4);
@@ -126,10 +126,10 @@ void RemeshSettings::validate(Section& s) const {
 }
 
 void OutputSettings::describe(Section& s) {
-  s.path("directory", directory, "where everything is written; default: ./out/<case name>");
+  s.path("directory", directory, "where everything is written; -o wins").default_is("./out/<case name>");
   s.integer("every", every, "increments between two outputs; the first and the last state are always written")
       .at_least(1);
-  s.words("fields", fields, "names of the fields to write; none: all that the scene has");
+  s.words("fields", fields, "names of the fields to write").default_is("all that the scene has");
   s.choice("precision", precision, {{"float32", Precision::float32}, {"float64", Precision::float64}},
            "of the fields; checkpoints are always float64");
 }

@@ -53,7 +53,7 @@ void ReferenceSettings::validate(Section& s) const {
 void ProbeSettings::describe(Section& s) {
   s.path("file", file, "CSV of points: x,y,z (m)").existing_file();
   s.vector("point", point, "m", "one point").starter("0 0 0 mm");
-  s.words("fields", fields, "names of the fields to record; none: all that the scene has");
+  s.words("fields", fields, "names of the fields to record").default_is("all that the scene has");
   s.choice("moves", motion, {{"no", ProbeMotion::fixed}, {"with-material", ProbeMotion::with_material}},
            "stays in space, or moves with the material");
 }
@@ -73,10 +73,11 @@ void BoundarySettings::describe(Section& s) {
       .names_surface_group();
   s.choice("type", type, {{"imposed", Type::imposed}, {"symmetry", Type::symmetry}},
            "imposed: what the keys below give; symmetry: no flow through it, no shear on it");
-  s.partial_vector("velocity", velocity, "m/s", "velocity").starter("0 0 free mm/s");
-  s.expressions("velocity", velocity_components, "m/s", "component of the velocity; one that is not given is free");
-  s.vector("traction", traction, "Pa", "force per area");
-  s.expressions("traction", traction_components, "Pa", "component of the force per area");
+  s.partial_vector("velocity", velocity, "m/s", "velocity, one number or the word free a dimension")
+      .starter("0 0 free mm/s");
+  s.expressions("velocity", velocity_components, "m/s", "its components one by one; one that is not given is free");
+  s.vector("traction", traction, "Pa", "force per area, one number a dimension");
+  s.expressions("traction", traction_components, "Pa", "its components one by one");
   s.expression("pressure", pressure, "Pa", "pressure that presses on the body");
 }
 
