@@ -63,7 +63,7 @@ void FacetTree::build(std::span<const Vector> centres, LocalId begin, LocalId en
   build(centres, middle, end);
 }
 
-ClosestFacet FacetTree::closest(const Vector& point, Real reach) const {
+ClosestFacet FacetTree::closest(const Vector& point, Real reach, const std::function<bool(LocalId)>& admits) const {
   ClosestFacet best;
   Real limit = reach * reach;
   std::vector<LocalId> stack;
@@ -83,6 +83,7 @@ ClosestFacet FacetTree::closest(const Vector& point, Real reach) const {
     }
     for (LocalId i = node.begin; i < node.end; ++i) {
       const LocalId facet = order_[static_cast<std::size_t>(i)];
+      if (admits && !admits(facet)) continue;
       const ClosestPoint candidate = set_->closest(facet, point);
       if (candidate.squared_distance > limit) continue;
       if (candidate.squared_distance == limit && best.facet >= 0 && facet > best.facet) continue;

@@ -2,6 +2,7 @@
 
 /// Closest facet of a surface through a tree of boxes. Everything here is local.
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -36,8 +37,9 @@ class FacetTree {
   FacetTree() = default;
   explicit FacetTree(const FacetSet& set);
 
-  /// Closest facet not farther than `reach` [m]; among equally close ones that of the lowest number.
-  ClosestFacet closest(const Vector& point, Real reach) const;
+  /// Closest facet not farther than `reach` [m], of those that `admits` (where given) takes; among equally close ones
+  /// that of the lowest number.
+  ClosestFacet closest(const Vector& point, Real reach, const std::function<bool(LocalId)>& admits = {}) const;
   /// Facets not farther than `reach`, in increasing order of number.
   std::vector<LocalId> within(const Vector& point, Real reach) const;
   Bounds bounds() const { return nodes_.empty() ? Bounds{} : nodes_.front().bounds; }
