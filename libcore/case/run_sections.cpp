@@ -48,7 +48,7 @@ Converter<Interval> interval_converter() {
 void CaseSettings::describe(Section& s) {
   s.string("name", name, "name of the output files").default_is("that of the case file");
   s.string("title", title, "a line for people");
-  s.choice("geometry", geometry, {{"cartesian", Geometry::cartesian}, {"axisymmetric", Geometry::axisymmetric}},
+  s.choice("geometry", geometry, {{"cartesian", CaseGeometry::cartesian}, {"axisymmetric", CaseGeometry::axisymmetric}},
            "a 2D mesh is plane strain, or is revolved about its y axis (x = r >= 0)");
 }
 
@@ -99,9 +99,9 @@ void SolverSettings::describe(Section& s) {
       .above(0)
       .by_level(3e-2, 1e-2, 1e-3, 1e-4);
   s.choice("linear_method", linear_method,
-           {{"block-triangular", LinearMethod::block_triangular},
-            {"gmres-ilu", LinearMethod::gmres_ilu},
-            {"conjugate-residual", LinearMethod::conjugate_residual}},
+           {{"block-triangular", LinearChoice::block_triangular},
+            {"gmres-ilu", LinearChoice::gmres_ilu},
+            {"conjugate-residual", LinearChoice::conjugate_residual}},
            "block-triangular FGMRES; the others are baselines for comparison");
 }
 

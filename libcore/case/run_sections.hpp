@@ -12,13 +12,13 @@
 namespace malleus {
 
 /// What a mesh of two dimensions stands for; a mesh of three is always Cartesian.
-enum class Geometry { cartesian, axisymmetric };
+enum class CaseGeometry { cartesian, axisymmetric };
 
 /// [case]
 struct CaseSettings {
   std::string name;  ///< of the output files; who reads sets the case file's stem before, as the default
   std::string title;
-  Geometry geometry = Geometry::cartesian;
+  CaseGeometry geometry = CaseGeometry::cartesian;
 
   void describe(Section& s);
   void validate(Section& s) const;
@@ -50,7 +50,7 @@ struct AccuracySettings {
 };
 
 /// How the linearised system is solved.
-enum class LinearMethod { block_triangular, gmres_ilu, conjugate_residual };
+enum class LinearChoice { block_triangular, gmres_ilu, conjugate_residual };
 
 /// [solver]
 struct SolverSettings {
@@ -58,7 +58,7 @@ struct SolverSettings {
   Real linear_tolerance = 0;  ///< on the true ||b - Ax|| / ||b||
   int max_newton = 30;
   Real cutoff_strain_rate = 0;  ///< below it a power law is Newtonian; in units of V/H, speed over height of the scene
-  LinearMethod linear_method = LinearMethod::block_triangular;
+  LinearChoice linear_method = LinearChoice::block_triangular;
 
   void describe(Section& s);
 };
