@@ -35,8 +35,9 @@ struct BorderColumn {
 /// have no part along them. Nodes that touch no modelled element are fully fixed, with -d in the pressure's row.
 struct LinearSystem {
   const Communicator* comm = nullptr;
-  const Mesh* mesh = nullptr;                    ///< for coordinates (rigid modes), elements, halo
-  Mat matrix = nullptr;                          ///< not owned
+  const Mesh* mesh = nullptr;  ///< for coordinates (rigid modes), elements, halo
+  /// Not owned, not to be changed. Beware of MatConvert(): PETSc 3.18 takes an MPIBAIJ matrix apart to convert it.
+  Mat matrix = nullptr;
   const NodeConstraints* constraints = nullptr;  ///< of the mesh's local nodes: owned, then copies
   std::span<const Real> element_viscosity;       ///< [element] Pa.s; 0 = not modelled, adds nothing to the matrix
   std::span<const Real> element_volume;          ///< [element] m^3; in axisymmetric scenes of the whole ring

@@ -35,10 +35,8 @@ LinearOutcome StokesLinearSolver::Implementation::solve(const LinearSystem& syst
   petsc_call(KSPSetTolerances(ksp.get(), tolerance, 0.0, PETSC_DEFAULT, 2000));
   PetscPreconditioner kernel;
   petsc_call(PCCreate(system.comm->raw(), kernel.out()));
-  PetscMatrix scalar;
   if (system.mesh->total_nodes() <= options_.direct_limit) {
-    petsc_call(MatConvert(system.matrix, MATAIJ, MAT_INITIAL_MATRIX, scalar.out()));
-    petsc_call(PCSetOperators(kernel.get(), scalar.get(), scalar.get()));
+    petsc_call(PCSetOperators(kernel.get(), system.matrix, system.matrix));
     petsc_call(PCSetType(kernel.get(), PCLU));
     petsc_call(PCFactorSetMatSolverType(kernel.get(), MATSOLVERMUMPS));
     petsc_call(PCFactorSetUpMatSolverType(kernel.get()));

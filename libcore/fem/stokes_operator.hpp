@@ -1,0 +1,165 @@
+#pragma once
+
+/// Residual and tangent of the Stokes equations on the mesh, with what acts on body and boundary.
+
+#include <memory>
+
+#include "fem/facet.hpp"
+#include "fem/linear_system.hpp"
+#include "fem/residual_term.hpp"
+#include "fem/stokes_mini.hpp"
+#include "fem/system_matrix.hpp"
+#include "fem/viscosity_model.hpp"
+
+namespace malleus {
+
+/// The unknowns of a scene.
+struct StokesState {
+  std::vector<Real> nodes;    ///< [local node][dim+1]: v_1..v_dim [m/s], p [Pa]; owned, then copies
+  std::vector<Real> borders;  ///< [gate]: the pressure on it, Pa; the same on all ranks
+};
+
+/// Force per area on a facet, linear between its nodes.
+struct FacetTraction {
+  LocalId facet = 0;
+  std::array<Real, 9> traction{};  ///< [node of the facet][dim], Pa
+};
+
+/// What acts from outside. Empty vectors act not at all.
+struct StokesLoads {
+  std::vector<Real> element_force;       ///< [element][dim], N/m^3: density times gravity, say
+  std::vector<Real> node_force;          ///< [local node][dim], N/m^3, linear between; added to the former
+  std::vector<Real> element_divergence;  ///< [element], 1/s: div v demanded (volume targets)
+  std::vector<FacetTraction> tractions;
+};
+
+/// Facets that share one unknown pressure q, traction -q n, such that the flow through them is the demanded one:
+/// integral of v.n over all ranks' facets = flux, n outward [m^3/s; negative = into the domain].
+struct FluxGate {
+  std::vector<LocalId> facets;
+  Real flux = 0;
+};
+
+/// Sizes against which residuals are judged; reduced over the ranks.
+struct ResidualReport {
+  Real norm = 0;       ///< of the scaled residual, borders included
+  Real reference = 0;  ///< of the forces that must balance: assembled internal forces or loads, N
+  Real relative() const { return reference > 0 ? norm / reference : norm; }
+};
+
+/// The node with the largest residual of force.
+struct WorstNode {
+  Real force = 0;               ///< N
+  std::array<Real, 3> place{};  ///< m
+};
+
+/// The discrete equations of quasi-static flow, seed paper eq. [4] with
+///
+///     integral 2 eta(gamma) eps(v):eps(w) - p div w + terms = loads,   -integral q (div v - divergence) - C p = 0
+///
+/// by condensed P1+/P1 elements. Holds the constraints, the loads, the viscosity of each element and the matrix. The
+/// communicator, the mesh, the model and the terms must outlive it; coordinates may move between calls.
+class StokesOperator {
+ public:
+  StokesOperator(const Communicator& comm, const Mesh& mesh, Geometry geometry);
+
+  const Mesh& mesh() const noexcept { return *mesh_; }
+  Geometry geometry() const noexcept { return geometry_; }
+  const Communicator& comm() const noexcept { return *comm_; }
+
+  void set_viscosity(const ViscosityModel& model) { model_ = &model; }
+  void set_constraints(NodeConstraints constraints) { constraints_ = std::move(constraints); }
+  const NodeConstraints& constraints() const noexcept { return constraints_; }
+  void set_loads(StokesLoads loads) { loads_ = std::move(loads); }
+  void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
+  void set_terms(std::vector<const ResidualTerm*> terms) { terms_ = std::move(terms); }
+  /// Nothing fixes the mean pressure (see LinearSystem). Found by the caller, who knows the boundary.
+  void set_pressure_free(bool is_free) { pressure_is_free_ = is_free; }
+
+  /// To be called when constraints, loads, gates, terms or coordinates were set or changed: volumes, couplings,
+  /// halo of the constraints. Collective.
+  void prepare();
+
+  /// A state of zero velocities and pressures that satisfies the constraints. Local.
+  StokesState start_state() const;
+  /// Puts the prescribed velocities into a state, and the right number of borders. Local.
+  void impose_constraints(StokesState& state) const;
+
+  /// Viscosities of the elements at the state's shear rates, or all at one shear rate [1/s]. Local.
+  void update_viscosity(const StokesState& state);
+  void update_viscosity(Real uniform_shear_rate);
+  std::span<const Real> viscosity() const noexcept { return viscosity_; }    ///< [element], Pa.s
+  std::span<const Real> shear_rate() const noexcept { return shear_rate_; }  ///< [element], of the last update, 1/s
+  std::span<const Real> volume() const noexcept { return volume_; }          ///< [element], m^3 (ring)
+  bool is_linear() const;                                                    ///< one linear solve is exact
+  Real sensitivity() const { return model_->sensitivity(); }
+
+  /// The residual at the current viscosities, scaled and projected as LinearSystem says (the right side of a step is
+  /// its negative). Collective.
+  ResidualReport residual(const StokesState& state, LinearVector& result);
+  /// The matrix at the current viscosities: Picard's, or Newton's consistent tangent. Collective.
+  const LinearSystem& tangent(const StokesState& state, bool newton);
+  /// state += factor * step, scales undone; copies updated. Collective.
+  void add_step(const LinearVector& step, Real factor, StokesState& state) const;
+
+  /// Forces that the constraints exert on the material [N], [owned node][dim]: the unprojected residual with loads and
+  /// terms, zero at free nodes to the solver's tolerance. Exact: their power is that of the discrete solution.
+  /// Collective.
+  std::vector<Real> reactions(const StokesState& state);
+  /// Of a result of residual(). Collective.
+  WorstNode worst_node(const LinearVector& residual) const;
+
+ private:
+  /// Nodal sums, [node of the space][dim+1] (N, m^3/s): of the elements' stresses, and of what stands against them.
+  struct Balance {
+    std::vector<Real> internal;
+    std::vector<Real> external;
+    Real roundoff = 0;  ///< square of the forces below which rounding rules, N^2
+  };
+  struct GateColumn {
+    std::vector<LocalId> nodes;  ///< owned, increasing
+    std::vector<Real> values;    ///< integral of phi n, [node][dim], m^2
+  };
+
+  void compute_volumes();
+  void fix_unmodelled_nodes();
+  void choose_scale();
+  GateColumn gate_column(const FluxGate& gate) const;
+  std::vector<Real> unknowns_in_space(const StokesState& state) const;
+  Balance balance(const StokesState& state);
+  template <class Element>
+  void add_elements(std::span<const Real> unknowns, Balance& sums) const;
+  template <class Element>
+  ElementLoad<Element::dim> element_load(LocalId element) const;
+  template <int D>
+  void add_tractions(Balance& sums) const;
+  void add_terms(std::span<const Real> unknowns, Balance& sums) const;
+  template <class Element>
+  void add_element_matrices(const StokesState& state, bool newton);
+  void scale_borders();
+
+  const Communicator* comm_;
+  const Mesh* mesh_;
+  Geometry geometry_;
+  const ViscosityModel* model_ = nullptr;
+  NodeConstraints constraints_;
+  NodeConstraints extended_constraints_;
+  StokesLoads loads_;
+  std::vector<FluxGate> gates_;
+  std::vector<const ResidualTerm*> terms_;
+  bool pressure_is_free_ = false;
+
+  NodeTuples tuples_;
+  std::unique_ptr<NodeSpace> space_;
+  std::unique_ptr<SystemMatrix> matrix_;
+  LinearSystem system_;
+  Real length_ = 1;  ///< of a typical element, m
+  bool scale_is_chosen_ = false;
+  std::vector<GateColumn> gate_columns_;
+  std::vector<Real> volume_;
+  std::vector<Real> shear_rate_;
+  std::vector<Real> viscosity_;
+  std::vector<Real> slope_;
+};
+
+}  // namespace malleus

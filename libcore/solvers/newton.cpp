@@ -1,0 +1,197 @@
+#include "solvers/newton.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace malleus {
+
+namespace {
+
+/// Below this sensitivity Newton needs a start nearer to the solution than one linear solve gives.
+constexpr Real picard_sensitivity = 0.3;
+constexpr int picard_steps = 3;
+/// Linear solves: the loosest, and gamma of Eisenstat and Walker's second choice (exponent 2).
+constexpr Real loosest_forcing = 1e-2;
+constexpr Real forcing_factor = 0.9;
+/// A step is taken where the residual falls by this share of what the full linear model promises (Armijo).
+constexpr Real sufficient_decrease = 1e-4;
+
+class Stopwatch {
+ public:
+  Real seconds() const { return std::chrono::duration<Real>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// One run of the loop: the state, its residual and the book-keeping.
+class Loop {
+ public:
+  Loop(const NewtonOptions& options, StokesOperator& op, StokesLinearSolver& linear, StokesState& state)
+      : options_(options), op_(op), linear_(linear), state_(state) {}
+
+  NewtonOutcome run();
+
+ private:
+  void solve_linear_problem();
+  void solve_nonlinear_problem();
+  void evaluate();
+  bool compute_step(bool newton, Real tolerance);
+  bool search(bool newton);
+  void take(Real share);
+  Real forcing(Real previous_norm);
+  bool reached() const { return report_.norm <= options_.tolerance * report_.reference; }
+  void give_up(const std::string& reason);
+
+  const NewtonOptions& options_;
+  StokesOperator& op_;
+  StokesLinearSolver& linear_;
+  StokesState& state_;
+  NewtonOutcome outcome_;
+  LinearVector residual_;
+  ResidualReport report_;
+  LinearVector step_;
+  Real forcing_ = loosest_forcing;
+};
+
+void Loop::evaluate() {
+  const Stopwatch watch;
+  op_.update_viscosity(state_);
+  report_ = op_.residual(state_, residual_);
+  outcome_.assembly_seconds += watch.seconds();
+}
+
+/// Solves for a step at the current residual. False where the linear solver failed.
+bool Loop::compute_step(bool newton, Real tolerance) {
+  const Stopwatch watch;
+  const LinearSystem& system = op_.tangent(state_, newton);
+  outcome_.assembly_seconds += watch.seconds();
+  LinearVector right_side = residual_;
+  for (Real& value : right_side.nodes) value = -value;
+  for (Real& value : right_side.borders) value = -value;
+  step_ = {};
+  const LinearOutcome solved = linear_.solve(system, right_side, tolerance, step_);
+  ++outcome_.linear_solves;
+  outcome_.linear_iterations += solved.iterations;
+  outcome_.setup_seconds += solved.setup_seconds;
+  outcome_.solve_seconds += solved.solve_seconds;
+  outcome_.history.push_back({newton, report_.relative(), 0, solved.iterations, solved.residual});
+  if (!solved.converged) give_up("the linear solver failed: " + solved.reason);
+  return solved.converged;
+}
+
+void Loop::take(Real share) {
+  op_.add_step(step_, share, state_);
+}
+
+void Loop::give_up(const std::string& reason) {
+  outcome_.converged = false;
+  outcome_.worst = op_.worst_node(residual_);
+  const auto& place = outcome_.worst.place;
+  outcome_.reason = fmt::format("{}; relative residual {:.3g} after {} iterations, worst at ({:.6g}, {:.6g}, {:.6g}) m",
+                                reason, report_.relative(), outcome_.iterations(), place[0], place[1], place[2]);
+}
+
+void Loop::solve_linear_problem() {
+  // The tolerance is relative to the right side of the problem from rest; a good first guess then saves iterations.
+  StokesState rest = op_.start_state();
+  LinearVector unused;
+  op_.update_viscosity(rest);
+  const Real whole = op_.residual(rest, unused).norm;
+  op_.impose_constraints(state_);
+  evaluate();
+  const Real goal = options_.linear_tolerance * whole;
+  if (report_.norm > goal) {
+    if (!compute_step(true, std::min(0.5, goal / report_.norm))) return;
+    take(1);
+    evaluate();
+    outcome_.history.back().step = 1;
+    outcome_.history.back().residual = report_.relative();
+  }
+  outcome_.converged = true;
+}
+
+/// Tolerance of the next linear solve; previous_norm: the residual's before the last step, 0 = none.
+Real Loop::forcing(Real previous_norm) {
+  if (previous_norm > 0) {
+    const Real ratio = report_.norm / previous_norm;
+    const Real guard = forcing_factor * forcing_ * forcing_;
+    forcing_ = std::min(loosest_forcing, forcing_factor * ratio * ratio);
+    if (guard > 0.1) forcing_ = std::max(forcing_, guard);
+  }
+  const Real wanted = options_.tolerance * report_.reference / report_.norm;
+  if (forcing_ > wanted) return forcing_;  // more steps will follow
+  return std::clamp(options_.linear_tolerance * report_.reference / report_.norm, 1e-10, forcing_);
+}
+
+/// Backtracking on the norm of the residual. False, with the state as before, where no share of a Newton step helps.
+bool Loop::search(bool newton) {
+  const StokesState start = state_;
+  const Real norm = report_.norm;
+  Real share = 1;
+  for (int cut = 0; cut <= options_.max_cuts; ++cut, share /= 2) {
+    state_ = start;
+    take(share);
+    evaluate();
+    // Picard's steps need no descent in this norm; they contract in the energy's.
+    if (!newton || report_.norm <= (1 - sufficient_decrease * share) * norm) {
+      outcome_.history.back().step = share;
+      outcome_.history.back().residual = report_.relative();
+      return true;
+    }
+  }
+  state_ = start;
+  evaluate();
+  return false;
+}
+
+void Loop::solve_nonlinear_problem() {
+  const int picard_start = op_.sensitivity() < picard_sensitivity ? picard_steps : 0;
+  const bool cold = options_.start_shear_rate > 0;
+  op_.impose_constraints(state_);
+  evaluate();
+  int picard_left = cold ? picard_start : 0;
+  Real previous_norm = 0;
+  for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+    const bool first = cold && iteration == 0;
+    if (first) {
+      op_.update_viscosity(options_.start_shear_rate);
+      report_ = op_.residual(state_, residual_);
+    } else if (reached()) {
+      outcome_.converged = true;
+      return;
+    }
+    const bool newton = !first && picard_left <= 0;
+    if (!first && !newton) --picard_left;
+    const Real tolerance = newton ? forcing(previous_norm) : loosest_forcing;
+    previous_norm = newton ? report_.norm : 0;
+    if (!compute_step(newton, tolerance)) return;
+    if (!search(newton)) {
+      picard_left = 1;
+      previous_norm = 0;
+    }
+  }
+  outcome_.converged = reached();
+  if (!outcome_.converged) give_up("no convergence");
+}
+
+NewtonOutcome Loop::run() {
+  if (op_.is_linear()) {
+    solve_linear_problem();
+  } else {
+    solve_nonlinear_problem();
+  }
+  outcome_.residual = report_.relative();
+  return outcome_;
+}
+
+}  // namespace
+
+NewtonOutcome NewtonSolver::solve(StokesOperator& op, StokesLinearSolver& linear, StokesState& state) const {
+  return Loop(options_, op, linear, state).run();
+}
+
+}  // namespace malleus

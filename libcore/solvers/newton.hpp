@@ -1,0 +1,67 @@
+#pragma once
+
+/// Newton's method for the nonlinear Stokes equations.
+
+#include <string>
+
+#include "fem/stokes_operator.hpp"
+#include "solvers/stokes_linear_solver.hpp"
+
+namespace malleus {
+
+struct NewtonOptions {
+  Real tolerance = 1e-4;         ///< relative nonlinear residual, contact terms included
+  Real linear_tolerance = 1e-6;  ///< of linear problems, and of the last linear solve of the loop
+  int max_iterations = 40;       ///< Picard steps counted
+  int max_cuts = 8;              ///< halvings of one step by the line search
+  /// Shear rate [1/s] at which viscosities are taken for the first step from a cold start; 0 = take the start state's.
+  Real start_shear_rate = 0;
+};
+
+/// One iteration, for the log.
+struct NewtonIteration {
+  bool newton = false;  ///< false: a Picard step
+  Real residual = 0;    ///< relative, at its end
+  Real step = 1;        ///< share of the full step taken
+  int linear_iterations = 0;
+  Real linear_residual = 0;  ///< relative, reached
+};
+
+/// How a solve ended; the same on all ranks. Where it did not converge the state is the best found and must not be
+/// taken for a solution.
+struct NewtonOutcome {
+  bool converged = false;
+  Real residual = 0;  ///< relative, at the end
+  int linear_iterations = 0;
+  int linear_solves = 0;
+  Real assembly_seconds = 0;
+  Real setup_seconds = 0;  ///< of preconditioners
+  Real solve_seconds = 0;
+  std::vector<NewtonIteration> history;
+  std::string reason;  ///< why it did not converge; with the place of the worst node
+  WorstNode worst;     ///< where it did not converge
+
+  int iterations() const noexcept { return static_cast<int>(history.size()); }
+};
+
+/// Solves residual(state) = 0.
+///
+/// A linear problem is solved once, to linear_tolerance relative to the right side that the prescribed velocities and
+/// loads make at rest. Otherwise: the first step from a cold start takes one viscosity at start_shear_rate; then Picard
+/// steps, at most three and only where the laws' sensitivity is below 0.3 (Picard contracts by 1 - m), then Newton with
+/// backtracking on the norm of the residual; where no share of a Newton step reduces it, a Picard step is taken
+/// instead. Linear solves are as exact as the progress warrants (Eisenstat and Walker 1996, choice 2), the last one to
+/// linear_tolerance of the whole.
+class NewtonSolver {
+ public:
+  explicit NewtonSolver(NewtonOptions options) : options_(options) {}
+
+  /// state: the first guess on entry, the solution on return. op: prepared; constraints are imposed on the state.
+  /// Collective.
+  NewtonOutcome solve(StokesOperator& op, StokesLinearSolver& linear, StokesState& state) const;
+
+ private:
+  NewtonOptions options_;
+};
+
+}  // namespace malleus
