@@ -62,8 +62,9 @@ class Expression::Formula {
     parser_.DefineVar("y", &y_);
     parser_.DefineVar("z", &z_);
     parser_.DefineVar("t", &t_);
-    parser_.DefineConst("pi", std::numbers::pi);
-    parser_.DefineConst("e", std::numbers::e);
+    // muParser's own _pi has but twelve digits after the point.
+    for (const char* name : {"pi", "_pi"}) parser_.DefineConst(name, std::numbers::pi);
+    for (const char* name : {"e", "_e"}) parser_.DefineConst(name, std::numbers::e);
     parser_.SetExpr(text);
     try {
       parser_.Eval();

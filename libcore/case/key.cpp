@@ -17,9 +17,13 @@ std::string Key::range() const {
 }
 
 void Key::check_range(Real value) const {
-  const bool is_high_enough = !lower || (lower->is_included ? value >= lower->value : value > lower->value);
-  const bool is_low_enough = !upper || (upper->is_included ? value <= upper->value : value < upper->value);
-  if (std::isfinite(value) && is_high_enough && is_low_enough) return;
+  // NaN first: even to compare it would raise a floating-point exception.
+  const auto is_inside = [&] {
+    const bool is_high_enough = !lower || (lower->is_included ? value >= lower->value : value > lower->value);
+    const bool is_low_enough = !upper || (upper->is_included ? value <= upper->value : value < upper->value);
+    return is_high_enough && is_low_enough;
+  };
+  if (std::isfinite(value) && is_inside()) return;
   throw InputError(fmt::format("{} is outside {}{}", format_real(value), range().empty() ? "(-inf, inf)" : range(),
                                unit.empty() ? "" : fmt::format(" {}", unit)));
 }

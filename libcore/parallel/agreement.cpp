@@ -29,6 +29,21 @@ Caught run_and_catch(const std::function<void()>& work) {
   return {};
 }
 
+[[noreturn]] void throw_of_kind(int code, const std::string& message) {
+  switch (code) {
+    case exit_code::defect:
+      throw Defect(message, std::source_location::current());
+    case exit_code::wrong_input:
+      throw InputError(message);
+    case exit_code::numerics:
+      throw NumericsError(message);
+    case exit_code::storage:
+      throw StorageError(message);
+    default:
+      throw Error(code, message);
+  }
+}
+
 }  // namespace
 
 void agree(const Communicator& comm, const std::function<void()>& work) {
@@ -40,8 +55,7 @@ void agree(const Communicator& comm, const std::function<void()>& work) {
   GlobalId code = caught.code;
   comm.broadcast(std::span(&code, 1), root);
   comm.broadcast(caught.message, root);
-  if (code == exit_code::defect) throw Defect(caught.message, std::source_location::current());
-  throw Error(static_cast<int>(code), caught.message);
+  throw_of_kind(static_cast<int>(code), caught.message);
 }
 
 void on_root(const Communicator& comm, const std::function<void()>& work) {
