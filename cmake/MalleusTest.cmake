@@ -15,6 +15,7 @@ function(malleus_unit_test name)
   endif()
   add_executable(test_${name} ${arg_SOURCES})
   target_link_libraries(test_${name} PRIVATE test_main ${arg_LIBRARIES})
+  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # they call optimised code; compile them fast
   set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   foreach(ranks ${arg_RANKS})
     add_test(NAME unit.${name}.${ranks}

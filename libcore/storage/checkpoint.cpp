@@ -16,6 +16,7 @@
 #include "field/fielded_piece.hpp"
 #include "parallel/agreement.hpp"
 #include "storage/atomic_file.hpp"
+#include "storage/field_list.hpp"
 #include "storage/h5_file.hpp"
 
 namespace malleus {
@@ -83,30 +84,6 @@ void write_part(const fs::path& path, const Mesh& mesh, const FieldStore& fields
     file.write("/fields/" + field->spec().name, field->values(), {field->values().size()});
   }
   file.close();
-}
-
-nlohmann::json describe_fields(const FieldStore& fields) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const Field* field : fields.all()) {
-    const FieldSpec& spec = field->spec();
-    list.push_back({{"name", spec.name},
-                    {"unit", spec.unit},
-                    {"support", static_cast<int>(spec.support)},
-                    {"components", spec.components},
-                    {"transfer", static_cast<int>(spec.transfer)},
-                    {"positive", spec.positive}});
-  }
-  return list;
-}
-
-std::vector<FieldSpec> field_specs(const nlohmann::json& list) {
-  std::vector<FieldSpec> specs;
-  for (const auto& entry : list) {
-    specs.push_back({entry.at("name"), entry.at("unit"), static_cast<Support>(entry.at("support").get<int>()),
-                     entry.at("components"), static_cast<Transfer>(entry.at("transfer").get<int>()),
-                     entry.at("positive")});
-  }
-  return specs;
 }
 
 /// The manifest of a checkpoint that is whole: its checksum and the list of parts are right.
@@ -181,18 +158,8 @@ FieldedPiece loosen(const Part& part, const std::vector<FieldSpec>& specs) {
     loose.piece.facet_nodes.insert(loose.piece.facet_nodes.end(), nodes.begin(), nodes.end());
     loose.piece.facet_group.push_back(mesh.facet_group[static_cast<std::size_t>(f)]);
   }
-  const auto interleave = [&](Support support, std::size_t entities, std::vector<Real>& rows) {
-    for (std::size_t i = 0; i < entities; ++i) {
-      for (std::size_t f = 0; f < specs.size(); ++f) {
-        if (specs[f].support != support) continue;
-        const auto width = static_cast<std::size_t>(specs[f].components);
-        rows.insert(rows.end(), part.fields[f].begin() + static_cast<std::ptrdiff_t>(i * width),
-                    part.fields[f].begin() + static_cast<std::ptrdiff_t>((i + 1) * width));
-      }
-    }
-  };
-  interleave(Support::node, loose.piece.node_numbers.size(), loose.node_values);
-  interleave(Support::element, mesh.element_region.size(), loose.element_values);
+  loose.node_values = interleave_fields(specs, part.fields, Support::node, loose.piece.node_numbers.size());
+  loose.element_values = interleave_fields(specs, part.fields, Support::element, mesh.element_region.size());
   return loose;
 }
 

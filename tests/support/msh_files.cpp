@@ -1,11 +1,9 @@
 #include "support/msh_files.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 
 #include "support/world.hpp"
@@ -272,25 +270,14 @@ std::string msh_bytes(const MshMesh& mesh, MshFlavour flavour) {
   return out.take();
 }
 
-TemporaryFile::TemporaryFile(const std::string& ending) {
-  static int count = 0;
-  std::string name = fmt::format("malleus-test-{}-{}{}", getpid(), count++, ending);
-  world().broadcast(name);
-  path_ = (std::filesystem::temp_directory_path() / name).string();
-}
-
-TemporaryFile::~TemporaryFile() {
-  if (!world().is_root()) return;
-  std::error_code ignored;
-  std::filesystem::remove(path_, ignored);
-}
-
-void TemporaryFile::write(const std::string& bytes) const {
+std::string put_file(const ScratchDirectory& scratch, const std::string& name, const std::string& bytes) {
+  const std::string path = (scratch.path() / name).string();
   if (world().is_root()) {
-    std::ofstream out(path_, std::ios::binary);
+    std::ofstream out(path, std::ios::binary);
     out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
   world().barrier();
+  return path;
 }
 
 }  // namespace malleus::test

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/types.hpp"
+#include "support/scratch_directory.hpp"
 
 namespace malleus::test {
 
@@ -44,19 +45,7 @@ MshMesh box_msh(int dim, int n);
 /// The file's bytes. An element of a physical group 0 has none.
 std::string msh_bytes(const MshMesh& mesh, MshFlavour flavour);
 
-/// A fresh path in the temporary directory, the same on all ranks; the file there is removed at destruction.
-/// Collective.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& ending);
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile();
-  const std::string& path() const noexcept { return path_; }
-  void write(const std::string& bytes) const;  ///< by the root; collective
-
- private:
-  std::string path_;
-};
+/// Puts bytes in a file in a scratch directory and gives its path. The root writes. Collective.
+std::string put_file(const ScratchDirectory& scratch, const std::string& name, const std::string& bytes);
 
 }  // namespace malleus::test

@@ -3,10 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
+#include <map>
 
 #include "base/error.hpp"
 #include "mesh/simplex.hpp"
+#include "support/mesh_checksum.hpp"
 #include "support/msh_files.hpp"
 #include "support/world.hpp"
 
@@ -18,7 +19,8 @@ using test::msh_bytes;
 using test::msh_flavours;
 using test::MshFlavour;
 using test::MshMesh;
-using test::TemporaryFile;
+using test::put_file;
+using test::ScratchDirectory;
 using test::world;
 
 constexpr int cells = 4;
@@ -37,56 +39,28 @@ std::vector<Real> volume_of_regions(const Mesh& mesh) {
   return volumes;
 }
 
-std::uint64_t mixed(std::uint64_t value) {
-  value ^= value >> 31;
-  value *= 0x9E3779B97F4A7C15ULL;
-  return value ^ (value >> 29);
+std::pair<GlobalId, GlobalId> summed(const Mesh& mesh) {
+  return {test::checksum_of_nodes(mesh), test::checksum_of_elements(mesh)};
 }
 
-/// Sum over the points of the owned nodes (or of the elements' corners) of a mixture of their bits: the same for any
-/// order and division.
-std::uint64_t checksum_of_point(const Real* point, int dim) {
-  std::uint64_t sum = 0;
-  for (int c = 0; c < dim; ++c) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &point[c], sizeof bits);
-    sum = mixed(sum + bits);
-  }
-  return sum;
-}
-
-GlobalId checksum_of_nodes(const Mesh& mesh) {
-  std::uint64_t sum = 0;
-  for (LocalId node = 0; node < mesh.owned_nodes(); ++node) sum += checksum_of_point(mesh.point(node), mesh.dim) >> 24;
-  return world().sum(static_cast<GlobalId>(sum));
-}
-
-GlobalId checksum_of_elements(const Mesh& mesh) {
-  std::uint64_t sum = 0;
-  for (LocalId e = 0; e < mesh.elements(); ++e) {
-    std::uint64_t corners = 0;
-    for (const LocalId node : mesh.nodes_of_element(e)) corners += checksum_of_point(mesh.point(node), mesh.dim);
-    sum += mixed(corners) >> 24;
-  }
-  return world().sum(static_cast<GlobalId>(sum));
-}
-
-/// The same sums from what was written.
+/// Sums of nodes and elements from what was written; region names as the reader gives them.
 std::pair<GlobalId, GlobalId> expected_checksums(const MshMesh& file, int dim) {
-  std::map<GlobalId, std::uint64_t> of_tag;
-  std::uint64_t nodes = 0;
+  MeshPiece piece;
+  piece.dim = dim;
+  piece.region_names = {"right", "left part"};
+  if (!world().is_root()) return summed(assemble_mesh(world(), piece).mesh);
+  std::map<GlobalId, LocalId> index;
   for (const test::MshNode& node : file.nodes) {
-    of_tag[node.tag] = checksum_of_point(node.point.data(), dim);
-    nodes += of_tag[node.tag] >> 24;
+    index[node.tag] = piece.nodes();
+    piece.node_numbers.push_back(node.tag);
+    piece.coordinates.insert(piece.coordinates.end(), node.point.begin(), node.point.begin() + dim);
   }
-  std::uint64_t elements = 0;
   for (const test::MshElement& element : file.elements) {
     if (element.type != (dim == 3 ? 4 : 2)) continue;
-    std::uint64_t corners = 0;
-    for (const GlobalId node : element.nodes) corners += of_tag[node];
-    elements += mixed(corners) >> 24;
+    for (const GlobalId node : element.nodes) piece.element_nodes.push_back(index.at(node));
+    piece.element_region.push_back(element.physical == 3 ? 0 : 1);
   }
-  return {static_cast<GlobalId>(nodes), static_cast<GlobalId>(elements)};
+  return summed(assemble_mesh(world(), piece).mesh);
 }
 
 class MshFile : public testing::TestWithParam<std::tuple<int, std::size_t>> {
@@ -94,9 +68,8 @@ class MshFile : public testing::TestWithParam<std::tuple<int, std::size_t>> {
   int dim() const { return std::get<0>(GetParam()); }
   MshFlavour flavour() const { return msh_flavours[std::get<1>(GetParam())]; }
   Mesh read(const MshMesh& mesh, Real length_unit = 1) const {
-    const TemporaryFile file(".msh");
-    file.write(msh_bytes(mesh, flavour()));
-    return build_mesh(world(), read_msh(world(), file.path(), length_unit));
+    const ScratchDirectory scratch;
+    return build_mesh(world(), read_msh(world(), put_file(scratch, "a.msh", msh_bytes(mesh, flavour())), length_unit));
   }
 };
 
@@ -106,7 +79,7 @@ TEST_P(MshFile, IsReadAsItWasWritten) {
   ASSERT_EQ(mesh.dim, dim());
   EXPECT_EQ(mesh.total_nodes(), static_cast<GlobalId>(file.nodes.size()));
   EXPECT_EQ(mesh.total_elements, dim() == 3 ? 6 * 64 : 2 * 16);
-  EXPECT_EQ(std::pair(checksum_of_nodes(mesh), checksum_of_elements(mesh)), expected_checksums(file, dim()));
+  EXPECT_EQ(summed(mesh), expected_checksums(file, dim()));
   EXPECT_EQ(mesh.region_names, (std::vector<std::string>{"right", "left part"}));
   const Real half = dim() == 3 ? 3.0 : 1.0;
   for (const Real volume : volume_of_regions(mesh)) EXPECT_NEAR(volume, half, 1e-14);
@@ -186,9 +159,9 @@ TEST(MshReader, TheFirstOfTwoPhysicalGroupsHolds) {
     again.physical = element.type == 4 ? 3 : 2;
     file.elements.push_back(again);
   }
-  const TemporaryFile path(".msh");
-  path.write(msh_bytes(file, {2, true}));
-  const Mesh mesh = build_mesh(world(), read_msh(world(), path.path()));
+  const ScratchDirectory scratch;
+  const std::string path = put_file(scratch, "a.msh", msh_bytes(file, {2, true}));
+  const Mesh mesh = build_mesh(world(), read_msh(world(), path));
   EXPECT_EQ(mesh.total_elements, 48);
   for (const Real volume : volume_of_regions(mesh)) EXPECT_NEAR(volume, 3.0, 1e-14);
   GlobalId bottom = std::count(mesh.facet_group.begin(), mesh.facet_group.end(), mesh.find_group("bottom"));
@@ -200,19 +173,19 @@ TEST(MshReader, CarriageReturnsAndForeignSectionsArePassedOver) {
   text.insert(text.find("$Entities"), "$Comments\nwritten by hand\n$EndComments\n\n");
   std::string with_returns;
   for (const char c : text) with_returns += c == '\n' ? "\r\n" : std::string(1, c);
-  const TemporaryFile path(".msh");
-  path.write(with_returns);
-  EXPECT_EQ(build_mesh(world(), read_msh(world(), path.path())).total_elements, 48);
+  const ScratchDirectory scratch;
+  const std::string path = put_file(scratch, "a.msh", with_returns);
+  EXPECT_EQ(build_mesh(world(), read_msh(world(), path)).total_elements, 48);
 }
 
 TEST(MshReader, LargeFilesAreReadAcrossTheLineIndex) {
   // More lines than one step of the line index, so that ranks start in the middle of the file.
   const MshMesh file = box_msh(3, 12);
   for (const int version : {2, 4}) {
-    const TemporaryFile path(".msh");
-    path.write(msh_bytes(file, {version, false}));
-    const Mesh mesh = build_mesh(world(), read_msh(world(), path.path()));
-    EXPECT_EQ(std::pair(checksum_of_nodes(mesh), checksum_of_elements(mesh)), expected_checksums(file, 3));
+    const ScratchDirectory scratch;
+    const std::string path = put_file(scratch, "a.msh", msh_bytes(file, {version, false}));
+    const Mesh mesh = build_mesh(world(), read_msh(world(), path));
+    EXPECT_EQ(summed(mesh), expected_checksums(file, 3));
   }
 }
 

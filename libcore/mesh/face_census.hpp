@@ -1,0 +1,26 @@
+#pragma once
+
+/// How often each face occurs in the whole mesh. Made for checking: all faces travel to a directory, nothing is taken
+/// for granted.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "parallel/communicator.hpp"
+
+namespace malleus {
+
+/// Node numbers of a face, increasing; in 2D the first is -1. The numbers agree between ranks.
+using FaceNumbers = std::array<GlobalId, 3>;
+
+/// Sorted face of dim nodes.
+FaceNumbers face_numbers(std::span<const GlobalId> nodes);
+
+/// The faces of elements, [element][dim+1], face f being opposite node f. element_nodes: [element][dim+1].
+std::vector<FaceNumbers> faces_of_elements(int dim, std::span<const GlobalId> element_nodes);
+
+/// For each face how many of the faces that all ranks gave are equal to it, itself included. Collective.
+std::vector<std::int32_t> count_equal_faces(const Communicator& comm, std::span<const FaceNumbers> faces);
+
+}  // namespace malleus
