@@ -1,6 +1,7 @@
 """The rules of the source tree hold here, and the checkers refuse what breaks them."""
 import os
 import pathlib
+import re
 import subprocess
 import tempfile
 import unittest
@@ -100,6 +101,16 @@ class Scripts(unittest.TestCase):
         for script in sorted((SOURCE / "scripts").iterdir()):
             if script.is_file() and script.read_bytes().startswith(b"#!/bin/bash"):
                 self.assertIn("\nset -euo pipefail\n", script.read_text(), script.name)
+
+
+class Pages(unittest.TestCase):
+    def test_links_lead_to_files(self):
+        pages = [SOURCE / "README.md", *SOURCE.glob("docs/*.md"), *SOURCE.glob("cases/**/*.md")]
+        links = [(page, link) for page in pages for link in re.findall(r"\]\(([^)#]+)", page.read_text())]
+        self.assertGreater(len(links), 20)
+        for page, link in links:
+            if "://" not in link:
+                self.assertTrue((page.parent / link).exists(), f"{page.relative_to(SOURCE)}: {link}")
 
 
 if __name__ == "__main__":
