@@ -11,6 +11,7 @@
 #include "engine/report.hpp"
 #include "engine/resources.hpp"
 #include "parallel/agreement.hpp"
+#include "partition/balance.hpp"
 #include "storage/atomic_file.hpp"
 
 namespace malleus {
@@ -19,6 +20,17 @@ namespace {
 constexpr int most_cuts = 12;           ///< of one increment's step, each to a half
 constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
 constexpr Real wall_time_margin = 1.3;  ///< times the longest checkpoint, kept free before the wall time ends
+
+/// Equal shares of a state that was read on another number of ranks than wrote it.
+void balance_saved(const Communicator& comm, SavedState& saved) {
+  FieldStore store;
+  for (auto& [spec, values] : saved.fields) store.declare(saved.mesh, spec).assign(std::move(values));
+  balance_along_curve(comm, saved.mesh, store);
+  saved.fields.clear();
+  for (const Field* field : store.all()) {
+    saved.fields.emplace_back(field->spec(), std::vector<Real>(field->values().begin(), field->values().end()));
+  }
+}
 
 std::vector<std::string> engine_columns() {
   return {"increment", "time_s", "dt_s", "nodes", "elements", "ranks", "volume_m3", "linear_iterations", "wall_s"};
@@ -116,6 +128,7 @@ void Engine::start_anew() {
 bool Engine::try_restart() {
   std::optional<SavedState> saved = checkpoints_.read_newest();
   if (!saved) return false;
+  if (saved->is_dealt_anew) balance_saved(comm_, *saved);
   on_root(comm_, [&] {
     log::open_file(settings_.directory / "run.log", true);
     write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);

@@ -7,8 +7,8 @@
 #include "case/help.hpp"
 #include "engine/command_line.hpp"
 #include "engine/engine.hpp"
+#include "engine/load_mesh.hpp"
 #include "engine/run_guarded.hpp"
-#include "mesh/msh_reader.hpp"
 
 namespace malleus {
 namespace {
@@ -77,7 +77,8 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   CaseReader reader(comm, CaseFile::read(comm, line.case_file, line.overrides));
   simulator.describe(reader);
   reader.finish();
-  Mesh mesh = build_mesh(comm, read_msh(comm, common.mesh.file, common.mesh.length_scale()));
+  FieldStore file_fields;
+  Mesh mesh = load_mesh(comm, common.mesh.file, common.mesh.length_scale(), file_fields);
   reader.check_mesh({mesh.dim, mesh.region_names, mesh.group_names});
   RunSettings settings = run_settings(line, simulator);
   const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);

@@ -230,6 +230,7 @@ SavedState read_state(const Communicator& comm, const fs::path& directory) {
     read_same_ranks(comm, directory, manifest, saved);
   } else {
     read_other_ranks(comm, directory, manifest, saved);
+    saved.is_dealt_anew = true;
   }
   return saved;
 }

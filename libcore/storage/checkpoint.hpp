@@ -18,6 +18,7 @@ using SavedField = std::pair<FieldSpec, std::vector<Real>>;
 
 struct SavedState {
   GlobalId increment = 0;
+  bool is_dealt_anew = false;  ///< read on another number of ranks: shares may be unequal
   Mesh mesh;
   std::vector<SavedField> fields;
   nlohmann::json state;  ///< of the engine and the process; same on all ranks

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/simplex.hpp"
+#include "partition/balance.hpp"
 #include "support/box_mesh.hpp"
 #include "support/world.hpp"
 
@@ -79,6 +79,16 @@ TEST_P(Migration, AllElementsMayGatherOnOneRankAndSpreadAgain) {
     spread.push_back(static_cast<int>(id * world().size() / scene.mesh.total_elements));
   migrate(world(), scene.mesh, scene.fields, spread);
   scene.expect_sound();
+}
+
+TEST_P(Migration, ElementsOnOneRankAreDealtOutEvenly) {
+  Scene scene(GetParam());
+  migrate(world(), scene.mesh, scene.fields, std::vector<int>(scene.mesh.element_ids.size(), 0));
+  balance_along_curve(world(), scene.mesh, scene.fields);
+  scene.expect_sound();
+  const Real mean = static_cast<Real>(scene.mesh.total_elements) / world().size();
+  EXPECT_LE(scene.mesh.elements(), 1.2 * mean);
+  EXPECT_EQ(balance_along_curve(world(), scene.mesh, scene.fields, 0.2).moved_elements, 0);
 }
 
 TEST_P(Migration, ReferencesToFieldsStayValid) {

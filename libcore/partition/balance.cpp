@@ -1,0 +1,35 @@
+#include "partition/balance.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "mesh/curve_partition.hpp"
+#include "mesh/space_filling_curve.hpp"
+
+namespace malleus {
+namespace {
+
+std::vector<std::uint64_t> centroid_keys(const Communicator& comm, const Mesh& mesh) {
+  const Box box = bounding_box(comm, mesh.coordinates, mesh.dim);
+  std::vector<std::uint64_t> keys(static_cast<std::size_t>(mesh.elements()));
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    std::array<Real, 3> centroid = {0, 0, 0};
+    for (const LocalId node : mesh.nodes_of_element(e)) {
+      for (int c = 0; c < mesh.dim; ++c) centroid[static_cast<std::size_t>(c)] += mesh.point(node)[c] / (mesh.dim + 1);
+    }
+    keys[static_cast<std::size_t>(e)] = hilbert_key(centroid.data(), mesh.dim, box);
+  }
+  return keys;
+}
+
+}  // namespace
+
+MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real tolerance) {
+  const auto largest = static_cast<Real>(comm.max(static_cast<GlobalId>(mesh.elements())));
+  const Real mean = static_cast<Real>(mesh.total_elements) / comm.size();
+  if (largest <= std::max(1.0, mean * (1 + tolerance))) return {};
+  const std::vector<std::uint64_t> keys = centroid_keys(comm, mesh);
+  return migrate(comm, mesh, fields, curve_partition(comm, keys, {}));
+}
+
+}  // namespace malleus

@@ -1,0 +1,13 @@
+#pragma once
+
+/// Equal shares for all ranks.
+
+#include "partition/migrate.hpp"
+
+namespace malleus {
+
+/// Deals the elements anew in equal stretches of the space-filling curve, where the present shares differ by more than
+/// `tolerance` (largest over mean, minus 1) or a rank is empty that need not be. Fields follow. Collective.
+MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real tolerance = 0.05);
+
+}  // namespace malleus
