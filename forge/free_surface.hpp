@@ -14,7 +14,8 @@ namespace malleus::forge {
 
 /// Exterior facets that no boundary condition holds. Each node on them knows all facets around it, also those of other
 /// ranks, as shares: a facet's area normal times the part of it that belongs to the node (a third in 3D, half in 2D;
-/// weighted with 2 pi r in axisymmetric scenes, where facets on the axis do not count). Valid for the coordinates at construction.
+/// weighted with 2 pi r in axisymmetric scenes, where facets on the axis do not count). Valid for the coordinates at
+/// construction.
 class FreeSurface {
  public:
   /// is_free: [group + 1], for facets without a group first, then of each group: whether contact may happen there.
@@ -36,8 +37,8 @@ class FreeSurface {
   std::span<const Vector> shares(std::size_t i) const {
     return std::span(shares_).subspan(offsets_[i], offsets_[i + 1] - offsets_[i]);
   }
-  Vector normal(std::size_t i) const;                          ///< unit mean normal of nodes()[i], out of the body
-  Real area(std::size_t i) const;                              ///< m^2 (m in 2D)
+  Vector normal(std::size_t i) const;  ///< unit mean normal of nodes()[i], out of the body
+  Real area(std::size_t i) const;      ///< m^2 (m in 2D)
   /// Area of nodes()[i] projected on a plane that faces it: n points toward the node's body.
   Real facing_area(std::size_t i, const Vector& n) const;
   /// Smoothed normal of a facet of this rank at its corner k, unit: mean over the facets at that node which are bent

@@ -66,9 +66,8 @@ class MasterFacets {
   Answer answer(const Question& question, Real reach) const {
     const Vector point = to_vector(question.point);
     const Vector normal = to_vector(question.normal);
-    const ClosestFacet closest = tree_.closest(point, reach, [&](LocalId f) {
-      return normals_[static_cast<std::size_t>(f)].dot(normal) < -facing_cosine;
-    });
+    const ClosestFacet closest = tree_.closest(
+        point, reach, [&](LocalId f) { return normals_[static_cast<std::size_t>(f)].dot(normal) < -facing_cosine; });
     Answer answer;
     if (closest.facet < 0) return answer;
     const Vector smoothed = smoothed_normal(closest);
@@ -155,7 +154,8 @@ std::vector<NodeFacetPair> find_pairs(const Communicator& comm, const FreeSurfac
   std::vector<NodeFacetPair> pairs;
   for (const auto& [index, answer] : best) {
     const auto place = static_cast<std::size_t>(index);
-    pairs.push_back({surface.nodes()[place], place, answer.masters, answer.weights, to_vector(answer.normal), answer.gap});
+    pairs.push_back(
+        {surface.nodes()[place], place, answer.masters, answer.weights, to_vector(answer.normal), answer.gap});
   }
   return pairs;
 }

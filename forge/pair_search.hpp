@@ -8,8 +8,8 @@ namespace malleus::forge {
 
 /// A slave node before the closest place of the master's surface.
 struct NodeFacetPair {
-  LocalId slave = -1;       ///< owned node
-  std::size_t surface = 0;  ///< its place in FreeSurface::nodes()
+  LocalId slave = -1;                              ///< owned node
+  std::size_t surface = 0;                         ///< its place in FreeSurface::nodes()
   std::array<GlobalId, 3> masters = {-1, -1, -1};  ///< nodes of the facet; the third is -1 in 2D
   std::array<Real, 3> weights = {0, 0, 0};         ///< of the closest place: >= 0, sum 1
   Vector normal = Vector::UnitX();                 ///< smoothed, unit, out of the master

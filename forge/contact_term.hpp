@@ -1,0 +1,46 @@
+#pragma once
+
+/// Contact and friction as forces in the Stokes equations.
+
+#include "fem/residual_term.hpp"
+#include "forge/friction.hpp"
+
+namespace malleus::forge {
+
+/// A slave node against one face of one opponent, with everything frozen but the velocities.
+struct ContactPoint {
+  LocalId slave = -1;          ///< owned node
+  GlobalId slave_number = -1;  ///< its global number
+  std::size_t surface = 0;     ///< its place in FreeSurface::nodes()
+  int opponent = 0;            ///< tools first, then pairs of bodies
+  Real area = 0;               ///< m^2 (m in plane strain): weight of the tractions
+  NormalTerm normal;
+  FrictionTerm friction;
+  Vector opponent_velocity = Vector::Zero();       ///< of a rigid opponent there, m/s
+  std::array<GlobalId, 3> masters = {-1, -1, -1};  ///< nodes of a deformable opponent's facet; -1: none
+  std::array<Real, 3> weights = {0, 0, 0};
+};
+
+/// Sum over the contact points of area times traction on the slave, and its opposite, weighted, on the masters. Each
+/// point is on the rank that owns its slave.
+class ContactTerm final : public ResidualTerm {
+ public:
+  explicit ContactTerm(int dim) : dim_(dim) {}
+
+  std::vector<ContactPoint>& points() noexcept { return points_; }
+  const std::vector<ContactPoint>& points() const noexcept { return points_; }
+
+  void extra_couplings(NodeTuples& tuples) const override;
+  void add_residual(const NodeSpace& space, std::span<const Real> unknowns, std::span<Real> force) const override;
+  void add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const override;
+  bool is_linear() const override { return false; }
+
+  /// Slave's velocity less the opponent's at the contact point, m/s. unknowns as in add_residual().
+  Vector slip(const ContactPoint& point, const NodeSpace& space, std::span<const Real> unknowns) const;
+
+ private:
+  int dim_;
+  std::vector<ContactPoint> points_;
+};
+
+}  // namespace malleus::forge

@@ -1,0 +1,139 @@
+#include "forge/forge_case.hpp"
+
+#include "base/error.hpp"
+#include "base/units.hpp"
+
+namespace malleus::forge {
+
+Real ToolSettings::surface_scale() const {
+  return convert_to_si(1, length_unit, parse_unit("m")).value;
+}
+
+void ToolSettings::describe(Section& s) {
+  describe_shape(s);
+  describe_motion(s);
+  friction.describe(s);
+}
+
+void ToolSettings::describe_shape(Section& s) {
+  s.choice("shape", shape,
+           {{"plane", ShapeKind::plane},
+            {"sphere", ShapeKind::sphere},
+            {"cylinder", ShapeKind::cylinder},
+            {"box", ShapeKind::box},
+            {"surface", ShapeKind::surface}},
+           "of the rigid tool");
+  s.choice("material", side, {{"outside", Side::outside}, {"inside", Side::inside}},
+           "where the material is: around a punch, within a container (not for planes)");
+  s.vector("point", point, "m", "a point of the plane; the centre of a sphere, a box, a cylinder; shift of a surface")
+      .starter("0 0 10 mm");
+  s.vector("normal", normal, "", "of a plane, out of the tool toward the material").starter("0 0 -1");
+  s.vector("axis", axis, "", "of a cylinder; in 2D without it the cylinder is a disc");
+  s.real("radius", radius, "m", "of a sphere or cylinder").above(0);
+  s.real("length", length, "m", "of a cylinder with flat ends, centred at `point`").above(0).default_is("infinite");
+  s.vector("size", size, "m", "edge lengths of a box; 0 = unlimited").at_least(0);
+  s.path("file", file, "surface: STL, ASCII or binary (3D)").existing_file();
+  s.string("length_unit", length_unit, "unit of the coordinates in the surface file");
+}
+
+void ToolSettings::describe_motion(Section& s) {
+  s.vector("velocity", velocity, "m/s",
+           "of the tool; of a hydraulic press, until its force limit; of a screw, a "
+           "hammer or a crank press, its direction")
+      .starter("0 0 -5 mm/s");
+  s.expressions("velocity", velocity_components, "m/s", "its components one by one, functions of t");
+  s.path("stroke_file", stroke_file, "CSV with columns time (s), position (m) along `direction`").existing_file();
+  s.vector("direction", direction, "", "of the stroke").default_is("that of the velocity, else a plane's normal");
+  s.real("spin", spin, "rad/s", "angular velocity about the spin_axis through `pivot`");
+  s.vector("spin_axis", spin_axis, "", "in 3D").default_is("the cylinder's axis, else z; z in 2D");
+  s.vector("pivot", pivot, "m", "a point of the axis of rotation").default_is("point");
+  s.choice("press", press,
+           {{"speed", PressKind::speed},
+            {"hydraulic", PressKind::hydraulic},
+            {"crank", PressKind::crank},
+            {"screw", PressKind::screw},
+            {"hammer", PressKind::hammer}},
+           "what drives the tool");
+  s.real("force_limit", force_limit, "N", "hydraulic: the speed falls so that this force is kept").above(0);
+  s.real("crank_radius", crank_radius, "m", "crank").above(0);
+  s.real("rod_length", rod_length, "m", "crank: length of the connecting rod").above(0);
+  s.real("rotation_speed", rotation_speed, "rad/s", "crank").above(0);
+  s.real("start_height", start_height, "m", "crank: height of the ram above its lowest position at the start").above(0);
+  s.real("energy", energy, "J", "hammer, screw: of the blow").above(0);
+  s.real("mass", mass, "kg", "hammer: falling mass; screw: the mass that has this energy at the starting speed")
+      .above(0);
+}
+
+void ToolSettings::validate(Section& s) const {
+  friction.validate(s);
+  validate_shape(s);
+  validate_motion(s);
+}
+
+void ToolSettings::validate_shape(Section& s) const {
+  switch (shape) {
+    case ShapeKind::plane:
+      s.require("normal", "shape = plane");
+      s.refuse("material", "a plane's normal says where the material is");
+      break;
+    case ShapeKind::sphere:
+      s.require("radius", "shape = sphere");
+      break;
+    case ShapeKind::cylinder:
+      s.require("radius", "shape = cylinder");
+      break;
+    case ShapeKind::box:
+      s.require("size", "shape = box");
+      break;
+    case ShapeKind::surface:
+      s.require("file", "shape = surface");
+      break;
+  }
+  if (normal && to_vector(normal->data(), 3).norm() == 0) s.fail("normal", "has no length");
+  if (axis && to_vector(axis->data(), 3).norm() == 0) s.fail("axis", "has no length");
+  try {
+    surface_scale();
+  } catch (const InputError& error) {
+    s.fail("length_unit", error.what());
+  }
+  if (size && to_vector(size->data(), 3).norm() == 0) s.fail("size", "has no positive edge");
+}
+
+void ToolSettings::validate_motion(Section& s) const {
+  const bool has_velocity = velocity || velocity_components[0] || velocity_components[1] || velocity_components[2];
+  const bool has_table = !stroke_file.empty();
+  if (has_table && has_velocity) s.fail("stroke_file", "and velocity are given: one of them moves the tool");
+  if (has_table && press != PressKind::speed) s.fail("stroke_file", "moves the tool by itself: press must be speed");
+  const bool has_direction = direction || (velocity && to_vector(velocity->data(), 3).norm() > 0) || normal;
+  if ((has_table || press != PressKind::speed) && !has_direction) {
+    s.fail("direction", "is needed: neither a velocity nor a plane's normal gives it");
+  }
+  if (direction && to_vector(direction->data(), 3).norm() == 0) s.fail("direction", "has no length");
+  switch (press) {
+    case PressKind::hydraulic:
+      s.require("force_limit", "press = hydraulic");
+      if (!has_velocity) s.fail("velocity", "is needed: press = hydraulic moves at it below its force limit");
+      break;
+    case PressKind::crank:
+      for (const char* key : {"crank_radius", "rod_length", "rotation_speed", "start_height"}) {
+        s.require(key, "press = crank");
+      }
+      if (rod_length && crank_radius && !(*rod_length > *crank_radius)) {
+        s.fail("rod_length", "must exceed crank_radius");
+      }
+      if (start_height && crank_radius && !(*start_height <= 2 * *crank_radius)) {
+        s.fail("start_height", "must not exceed twice the crank_radius");
+      }
+      break;
+    case PressKind::hammer:
+    case PressKind::screw:
+      s.require("energy", "press = hammer and press = screw");
+      s.require("mass", "press = hammer and press = screw");
+      break;
+    case PressKind::speed:
+    case PressKind::stroke_table:
+      break;
+  }
+}
+
+}  // namespace malleus::forge
