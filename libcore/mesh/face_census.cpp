@@ -11,7 +11,7 @@ namespace malleus {
 namespace {
 
 GlobalId lowest(const FaceNumbers& face) {
-  return face[0] >= 0 ? face[0] : face[1];
+  return *std::find_if(face.begin(), face.end() - 1, [](GlobalId number) { return number >= 0; });
 }
 
 }  // namespace

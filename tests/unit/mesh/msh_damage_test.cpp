@@ -49,7 +49,7 @@ std::string ascii(int version, int dim = 3) {
 TEST(DamagedMsh, CutAnywhereIsRefused) {
   for (const test::MshFlavour flavour : msh_flavours) {
     const std::string whole = msh_bytes(box_msh(3, 1), flavour);
-    const std::size_t step = whole.size() / 40 + 1;
+    const std::size_t step = whole.size() / 24 + 1;
     for (std::size_t size = 0; size + 2 < whole.size(); size += step) {
       const std::string text = told(whole.substr(0, size));
       EXPECT_EQ(text.substr(0, 4), "FILE") << "cut after " << size << " of " << whole.size() << ": " << text;
@@ -62,14 +62,14 @@ TEST(DamagedMsh, ChangedBytesNeverCrash) {
   int refused = 0;
   for (const test::MshFlavour flavour : msh_flavours) {
     const std::string whole = msh_bytes(box_msh(3, 1), flavour);
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 30; ++i) {
       std::string damaged = whole;
       damaged[random() % damaged.size()] = static_cast<char>(random() % 256);
       damaged[random() % damaged.size()] = static_cast<char>("0-9eN$\n\xff"[random() % 8]);
       refused += told(damaged).empty() ? 0 : 1;
     }
   }
-  EXPECT_GT(refused, 100);
+  EXPECT_GT(refused, 50);
 }
 
 TEST(DamagedMsh, ValuesAreNamedWithTheirLine) {
