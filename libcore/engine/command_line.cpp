@@ -1,14 +1,13 @@
 #include "engine/command_line.hpp"
 
 #include <fmt/format.h>
-#include <hdf5.h>
-#include <mpi.h>
-#include <petscversion.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "base/error.hpp"
+#include "parallel/session.hpp"
+#include "storage/h5_file.hpp"
 
 namespace malleus {
 namespace {
@@ -45,15 +44,8 @@ void add_options(CLI::App& app, CommandLine& line) {
 }  // namespace
 
 std::string version_text(const std::string& program) {
-  unsigned major = 0, minor = 0, release = 0;
-  H5get_libversion(&major, &minor, &release);
-  char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
-  int length = 0;
-  MPI_Get_library_version(mpi, &length);
-  const std::string mpi_text(mpi, static_cast<std::size_t>(length));
-  return fmt::format("{} {} (PETSc {}.{}.{}, HDF5 {}.{}.{}, {}, GCC {})", program, MALLEUS_VERSION, PETSC_VERSION_MAJOR,
-                     PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR, major, minor, release,
-                     mpi_text.substr(0, mpi_text.find(',')), __VERSION__);
+  return fmt::format("{} {} ({}, {}, GCC {})", program, MALLEUS_VERSION, parallel_library_versions(), hdf5_version(),
+                     __VERSION__);
 }
 
 CommandLine parse_command_line(const std::string& program, const std::string& description,

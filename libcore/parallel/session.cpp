@@ -1,5 +1,6 @@
 #include "parallel/session.hpp"
 
+#include <fmt/format.h>
 #include <petscsys.h>
 
 namespace malleus {
@@ -31,6 +32,15 @@ Session::~Session() {
   world_.reset();
   PetscFinalize();
   MPI_Finalize();
+}
+
+std::string parallel_library_versions() {
+  char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  int length = 0;
+  MPI_Get_library_version(mpi, &length);
+  const std::string text(mpi, static_cast<std::size_t>(length));
+  return fmt::format("PETSc {}.{}.{}, {}", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR,
+                     text.substr(0, text.find(',')));
 }
 
 }  // namespace malleus

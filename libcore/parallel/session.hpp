@@ -25,4 +25,7 @@ class Session {
   std::unique_ptr<Communicator> world_;
 };
 
+/// "PETSc 3.18.5, Open MPI v4.1.4", say. Local; may be called before a Session.
+std::string parallel_library_versions();
+
 }  // namespace malleus

@@ -188,4 +188,10 @@ std::vector<std::string> H5File::names_in(const std::string& group) const {
   return names;
 }
 
+std::string hdf5_version() {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  return fmt::format("HDF5 {}.{}.{}", major, minor, release);
+}
+
 }  // namespace malleus

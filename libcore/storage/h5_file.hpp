@@ -53,4 +53,7 @@ class H5File {
   std::int64_t file_ = -1;
 };
 
+/// "HDF5 1.10.8", say: the library in use. Local.
+std::string hdf5_version();
+
 }  // namespace malleus
