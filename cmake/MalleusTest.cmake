@@ -36,5 +36,5 @@ function(malleus_system_test name)
   add_test(NAME system.${name} COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCRIPT})
   set_tests_properties(system.${name} PROPERTIES
     PROCESSORS ${arg_PROCESSORS} TIMEOUT ${arg_TIMEOUT} LABELS "system;${arg_LABELS}"
-    ENVIRONMENT "${MALLEUS_MPI_ENVIRONMENT};MALLEUS_BIN=${CMAKE_BINARY_DIR}/bin;MALLEUS_SOURCE=${CMAKE_SOURCE_DIR};PYTHONPATH=${CMAKE_SOURCE_DIR}/tests/support")
+    ENVIRONMENT "${MALLEUS_MPI_ENVIRONMENT};MALLEUS_BIN=${CMAKE_BINARY_DIR}/bin;MALLEUS_SOURCE=${CMAKE_SOURCE_DIR};PYTHONPATH=${CMAKE_SOURCE_DIR}/tests/support:${CMAKE_SOURCE_DIR}/scripts")
 endfunction()
