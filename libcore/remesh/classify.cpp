@@ -204,7 +204,7 @@ class Classifier {
       const Kind& kind = kinds_[static_cast<std::size_t>(faces_[f].kind)];
       if (patch < 0) {
         patch = static_cast<std::int32_t>(mesh_.patches.size());
-        mesh_.patches.push_back({kind.group, kind.frozen, true, kind.listed, {}});
+        mesh_.patches.push_back({kind.group, kind.frozen, true, kind.listed, {}, kind.low_region >= 0});
       }
       const auto id = static_cast<std::int16_t>(patch);
       Element<D>& element = mesh_.element(element_of(faces_[f].ref));

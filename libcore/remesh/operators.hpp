@@ -71,12 +71,16 @@ class Operators {
   bool keeps_links(LocalId v, LocalId w);
   bool bends_surface(const StarOf& star) const;
   bool faces_stay_close(const StarOf& star) const;
+  bool ball_stays_close(LocalId v) const;
   void move_curve_edges(LocalId v, LocalId w);
   bool swap_patch_edge(LocalId a, LocalId b, Real worst);
   bool edge_exists(LocalId a, LocalId b);
   std::size_t edge_of(LocalId e, LocalId a, LocalId b) const;
   Point<D> ideal_position(LocalId v) const;
   bool try_site(LocalId v, const Site<D, Metric>& site, Real worst, Real total);
+  bool return_to_surface(LocalId v, Real worst);
+  template <class Accept>
+  bool put_at(LocalId v, const Site<D, Metric>& site, Real floor, Accept&& accept);
   void commit(const StarOf& star);
   LocalId take_vertex();
 

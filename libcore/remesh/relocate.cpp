@@ -64,9 +64,44 @@ Point<D> Operators<D, Metric>::ideal_position(LocalId v) const {
   return sum;
 }
 
+/// Are the faces that curved patches have at v near the input surface?
+template <int D, class Metric>
+bool Operators<D, Metric>::ball_stays_close(LocalId v) const {
+  if (mesh_.vertex(v).dimension == D || !background_.is_on_curved(v)) return true;
+  for (const LocalId e : cavity_.elements()) {
+    const Element<D>& element = mesh_.element(e);
+    for (std::size_t f = 0; f <= D; ++f) {
+      if (element.patch[f] == no_patch || element.node[f] == v || mesh_.patch(element.patch[f]).flat) continue;
+      std::array<Point<D>, D> points;
+      for (std::size_t k = 0; k < D; ++k) points[k] = mesh_.point(element.node[FaceTable<D>::nodes[f][k]]);
+      if (!background_.allows_face(points, background_.hint(v, element.patch[f]))) return false;
+    }
+  }
+  return true;
+}
+
 /// Moves v there if the worst key of its elements gains, or stays while their sum gains.
 template <int D, class Metric>
 bool Operators<D, Metric>::try_site(LocalId v, const Site<D, Metric>& site, Real worst, Real total) {
+  const auto gains = [&](Real new_worst, Real new_total) {
+    return new_worst > 1.0005 * worst || (new_worst >= 0.999 * worst && new_total > 1.001 * total);
+  };
+  return put_at(v, site, 0.9 * worst, gains);
+}
+
+/// Vertices that were put on a chord of the surface are brought onto it as soon as their elements stand it.
+template <int D, class Metric>
+bool Operators<D, Metric>::return_to_surface(LocalId v, Real worst) {
+  const Site<D, Metric> site = background_.site_for(v, mesh_.point(v));
+  if (squared_length<D>(mesh_.point(v), mesh_.metric(v), site.position, site.metric) < 1e-8) return false;
+  return put_at(v, site, 0.3 * worst, [](Real, Real) { return true; });
+}
+
+/// Puts v there if no key falls to the floor, faces stay close to the surface, and accept(worst key, sum of keys)
+/// holds.
+template <int D, class Metric>
+template <class Accept>
+bool Operators<D, Metric>::put_at(LocalId v, const Site<D, Metric>& site, Real floor, Accept&& accept) {
   const Point<D> old_point = mesh_.point(v);
   const Metric old_metric = mesh_.metric(v);
   mesh_.point(v) = site.position;
@@ -75,21 +110,20 @@ bool Operators<D, Metric>::try_site(LocalId v, const Site<D, Metric>& site, Real
   keys_.resize(elements.size());
   Real new_worst = 2;
   Real new_total = 0;
-  for (std::size_t n = 0; n < elements.size() && new_worst > 0.9 * worst; ++n) {
+  for (std::size_t n = 0; n < elements.size() && new_worst > floor; ++n) {
     const Real key = mesh_.key_of_element(mesh_.element(elements[n]));
     keys_[n] = static_cast<float>(key);
     new_worst = std::min(new_worst, key);
     new_total += key;
   }
-  const bool better = new_worst > 1.0005 * worst || (new_worst >= 0.999 * worst && new_total > 1.001 * total);
-  if (!better) {
+  const bool better = new_worst > floor && accept(new_worst, new_total);
+  if (!better || !ball_stays_close(v)) {
     mesh_.point(v) = old_point;
     mesh_.metric(v) = old_metric;
     return false;
   }
-  Vertex& vertex = mesh_.vertex(v);
-  vertex.input_element = site.input_element;
-  vertex.input_face = site.input_face;
+  mesh_.vertex(v).input_element = site.input_element;
+  mesh_.vertex(v).input_face = site.input_face;
   for (std::size_t n = 0; n < elements.size(); ++n) mesh_.element(elements[n]).key = keys_[n];
   return true;
 }
@@ -104,6 +138,12 @@ bool Operators<D, Metric>::relocate(LocalId v) {
     total += mesh_.element(e).key;
   }
   if (worst <= 0) return false;
+  if (background_.is_on_curved(v) && return_to_surface(v, worst)) {
+    for (const LocalId e : cavity_.elements()) enlist(e, pending::swap | pending::length);
+    enlist_vertex(v);
+    ++counts.moves;
+    return true;
+  }
   const Point<D> from = mesh_.point(v);
   const Point<D> wanted = ideal_position(v);
   Real step = 1;

@@ -5,6 +5,7 @@
 
 #include "remesh/build.hpp"
 #include "remesh/remesher.hpp"
+#include "remesh/volume.hpp"
 
 namespace malleus {
 namespace {
@@ -49,9 +50,13 @@ RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOp
   report.unused_nodes = notes.unused_nodes;
   input = {};
   report.before = assess(mesh);
+  const std::vector<Real> volumes = region_volumes(mesh);
+  renumber(mesh);
+  const Background<D, VertexMetric> background(mesh, options.hausdorff, metric.kind() != Metric::Kind::uniform);
   report.phases.push_back({"build", static_cast<Real>(std::clock() - start) / CLOCKS_PER_SEC});
-  Remesher<D, VertexMetric>(mesh, options).run(report);
+  Remesher<D, VertexMetric>(mesh, background, options).run(report);
   const auto finish = std::clock();
+  if (options.keep_volume) report.volume_error = restore_volumes(mesh, volumes);
   report.after = assess(mesh);
   input = to_arrays(mesh);
   report.nodes_after = input.nodes();

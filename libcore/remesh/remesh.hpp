@@ -11,6 +11,7 @@ namespace malleus {
 
 struct RemeshOptions {
   Real feature_angle = 45;     ///< degrees; edges (corners in 2D) that bend more are kept as features
+  Real hausdorff = 0;          ///< m; faces stay this close to the input surface; 0 = bounded by their slope alone
   bool keep_surface = false;   ///< no facet changes
   bool keep_volume = false;    ///< restore each region's volume by a shift of curved free surfaces along normals
   int size_rounds = 60;        ///< at most, until edge lengths settle
@@ -34,6 +35,7 @@ struct RemeshReport {
   LocalId nodes_before = 0, nodes_after = 0;
   LocalId elements_before = 0, elements_after = 0;
   Real volume_before = 0, volume_after = 0;  ///< m^D, signed
+  Real volume_error = 0;                     ///< with keep_volume: largest relative error of a region's volume
   RemeshQuality before, after;
   std::int64_t splits = 0, collapses = 0, swaps = 0, moves = 0;
   LocalId unmatched_facets = 0;  ///< listed facets that were no element's face

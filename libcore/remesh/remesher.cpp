@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <ctime>
 
+#include "remesh/untangle.hpp"
+
 namespace malleus::remeshing {
 namespace {
 
@@ -144,6 +146,12 @@ void Remesher<D, Metric>::move_pass() {
   }
 }
 
+/// What stays inverted at first is often free once the elements around it have become better.
+template <int D, class Metric>
+void Remesher<D, Metric>::untangle() {
+  if (tangled_) timed("untangle", [&] { tangled_ = Untangler<D, Metric>(mesh_).run() > 0; });
+}
+
 template <int D, class Metric>
 void Remesher<D, Metric>::settle_sizes() {
   const Limits& limits = operators_.limits;
@@ -154,6 +162,7 @@ void Remesher<D, Metric>::settle_sizes() {
     timed("collapse", [&] { collapse_pass(0.45); });
     timed("swap", [&] { swap_pass(quality_to_key<D>(0.63)); });
     timed("move", [&] { move_pass(); });
+    untangle();
     timed("renumber", [&] { renumber_all(); });
     const std::int64_t changes =
         operators_.counts.splits - before.splits + operators_.counts.collapses - before.collapses;
@@ -170,12 +179,13 @@ void Remesher<D, Metric>::improve() {
     timed("collapse", [&] { collapse_pass(0.5); });
     if (!last) timed("split", [&] { split_pass(operators_.limits.long_edge); });
     timed("move", [&] { move_pass(); });
+    untangle();
   }
 }
 
 template <int D, class Metric>
 void Remesher<D, Metric>::run(RemeshReport& report) {
-  timed("renumber", [&] { renumber_all(); });
+  untangle();
   enlist_all();
   settle_sizes();
   improve();

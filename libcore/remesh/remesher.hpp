@@ -12,14 +12,15 @@ namespace malleus::remeshing {
 template <int D, class Metric>
 class Remesher {
  public:
-  Remesher(WorkingMesh<D, Metric>& mesh, const RemeshOptions& options)
-      : mesh_(mesh), options_(options), background_(mesh), operators_(mesh, background_) {}
+  Remesher(WorkingMesh<D, Metric>& mesh, const Background<D, Metric>& background, const RemeshOptions& options)
+      : mesh_(mesh), options_(options), operators_(mesh, background) {}
 
-  /// Elements' keys and vertices' metrics must be set.
+  /// Elements' keys and vertices' metrics must be set, and the mesh renumbered.
   void run(RemeshReport& report);
 
  private:
   void settle_sizes();
+  void untangle();
   void improve();
   void enlist_all();
   void renumber_all();
@@ -33,9 +34,9 @@ class Remesher {
 
   WorkingMesh<D, Metric>& mesh_;
   const RemeshOptions& options_;
-  Background<D, Metric> background_;
   Operators<D, Metric> operators_;
   std::vector<RemeshPhase> phases_;
+  bool tangled_ = true;  ///< inverted elements may be left
 };
 
 /// Quality of all elements and lengths of all edges.

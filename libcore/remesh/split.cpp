@@ -87,8 +87,12 @@ bool Operators<D, Metric>::faces_stay_close(const StarOf& star) const {
   cavity_.visit_new_patch_faces(star, [&](const std::array<LocalId, D>& face, std::int16_t patch) {
     if (!close || mesh_.patch(patch).flat) return;
     std::array<Point<D>, D> points;
-    for (std::size_t k = 0; k < D; ++k) points[k] = face[k] == star.apex ? star.site.position : mesh_.point(face[k]);
-    close = background_.allows_face(points, patch);
+    LocalId hint = -1;
+    for (std::size_t k = 0; k < D; ++k) {
+      points[k] = face[k] == star.apex ? star.site.position : mesh_.point(face[k]);
+      if (face[k] >= 0 && hint < 0) hint = background_.hint(face[k], patch);
+    }
+    close = background_.allows_face(points, hint);
   });
   return close;
 }
@@ -124,7 +128,12 @@ bool Operators<D, Metric>::split(LocalId e, std::size_t edge) {
   StarOf star{-1, background_.site_on_edge(a, b, entity), a, b};
   if (is_near_ring(star) || cavity_.removes_frozen(star)) return false;
   const Real limit = std::min(limits.split_key, 0.3 * worst);
-  if (cavity_.evaluate(star, limit) <= limit || !faces_stay_close(star)) return false;
+  if (cavity_.evaluate(star, limit) <= limit) {
+    // The curve of the surface would turn an element over: the chord will do until relocation brings the point out.
+    if (entity.dimension == D) return false;
+    star.site = background_.site_on_edge(a, b, entity, true);
+    if (cavity_.evaluate(star, limit) <= limit) return false;
+  }
   return split_at(star, entity, a, b);
 }
 

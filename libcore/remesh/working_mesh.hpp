@@ -73,9 +73,10 @@ template <int D>
 struct Patch {
   std::int32_t group = -1;
   bool frozen = false;
-  bool flat = true;    ///< within round-off
-  bool listed = true;  ///< goes to the output's facets
-  Point<D> normal{};   ///< of a flat patch, unit
+  bool flat = true;        ///< within round-off
+  bool listed = true;      ///< goes to the output's facets
+  Point<D> normal{};       ///< of a flat patch, unit
+  bool two_sided = false;  ///< elements on both sides
 };
 
 /// A connected chain of feature edges (3D).
