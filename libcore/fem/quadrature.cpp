@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "base/error.hpp"
 
@@ -11,30 +10,25 @@ namespace malleus {
 namespace {
 
 struct LinePoint {
-  Real place;  ///< in (0, 1)
-  Real weight;
+  Real place;   ///< u in (0, 1)
+  Real weight;  ///< sum 1
 };
 
-/// Gauss-Legendre on (0, 1): Newton on the Legendre polynomial by its three-term recurrence.
-std::vector<LinePoint> gauss_legendre(int n) {
+/// Gauss-Jacobi on (0, 1) with weight (1-u)^power, by the eigenvalues of the recurrence (Golub, Welsch 1969).
+std::vector<LinePoint> gauss_jacobi(int n, int power) {
+  Eigen::MatrixXd recurrence = Eigen::MatrixXd::Zero(n, n);
+  const Real a = power;
+  for (int k = 0; k < n; ++k) {
+    recurrence(k, k) = k == 0 ? -a / (a + 2) : -a * a / ((2 * k + a) * (2 * k + a + 2));
+    if (k == 0) continue;
+    const Real sum = 2 * k + a;
+    recurrence(k, k - 1) = recurrence(k - 1, k) = 2 * k * (k + a) / (sum * std::sqrt((sum + 1) * (sum - 1)));
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(recurrence);
   std::vector<LinePoint> points;
-  for (int i = 0; i < n; ++i) {
-    Real x = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5));
-    Real derivative = 1;
-    for (int iteration = 0; iteration < 50; ++iteration) {
-      Real previous = 1;
-      Real value = x;
-      for (int k = 2; k <= n; ++k) {
-        const Real next = ((2 * k - 1) * x * value - (k - 1) * previous) / k;
-        previous = value;
-        value = next;
-      }
-      derivative = n * (x * value - previous) / (x * x - 1);
-      const Real change = value / derivative;
-      x -= change;
-      if (std::abs(change) < 1e-15) break;
-    }
-    points.push_back({0.5 * (1 - x), 1 / ((1 - x * x) * derivative * derivative)});
+  for (int k = 0; k < n; ++k) {
+    const Real first = solver.eigenvectors()(0, k);
+    points.push_back({0.5 * (1 + solver.eigenvalues()[k]), first * first});
   }
   return points;
 }
@@ -44,19 +38,19 @@ std::vector<LinePoint> gauss_legendre(int n) {
 template <int D>
 std::vector<QuadraturePoint<D>> simplex_quadrature(int n) {
   check(n >= 1 && n <= 8, "a quadrature has 1 to 8 points an axis");
-  const std::vector<LinePoint> line = gauss_legendre(n);
+  std::array<std::vector<LinePoint>, D> lines;
+  for (int d = 0; d < D; ++d) lines[static_cast<std::size_t>(d)] = gauss_jacobi(n, D - 1 - d);
   std::vector<QuadraturePoint<D>> points;
-  std::array<int, 3> index{};
   const int count = D == 2 ? n * n : n * n * n;
   for (int k = 0; k < count; ++k) {
-    index = {k % n, k / n % n, k / n / n};
+    const std::array<int, 3> index = {k % n, k / n % n, k / n / n};
     QuadraturePoint<D> point;
+    point.weight = 1;
     Real rest = 1;  // what the axes so far leave of the barycentric sum
-    point.weight = D == 2 ? 2 : 6;
-    for (int d = 0; d < D; ++d) {
-      const LinePoint& along = line[static_cast<std::size_t>(index[static_cast<std::size_t>(d)])];
-      point.barycentric[d] = rest * along.place;
-      point.weight *= along.weight * std::pow(1 - along.place, D - 1 - d);
+    for (std::size_t d = 0; d < D; ++d) {
+      const LinePoint& along = lines[d][static_cast<std::size_t>(index[d])];
+      point.barycentric[static_cast<int>(d)] = rest * along.place;
+      point.weight *= along.weight;
       rest *= 1 - along.place;
     }
     point.barycentric[D] = rest;

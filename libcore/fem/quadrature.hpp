@@ -16,8 +16,8 @@ struct QuadraturePoint {
   Real weight;
 };
 
-/// Conical product of Gauss-Legendre rules with n points an axis (Stroud 1971): n^D points, exact for polynomials of
-/// degree 2n - D. 1 <= n <= 8.
+/// Conical product of Gauss-Jacobi rules with n points an axis (Stroud 1971): n^D points, exact for polynomials of
+/// degree 2n - 1. 1 <= n <= 8.
 template <int D>
 std::vector<QuadraturePoint<D>> simplex_quadrature(int n);
 

@@ -103,6 +103,81 @@ void StokesOperator::prepare() {
   gate_columns_.clear();
   for (const FluxGate& gate : gates_) gate_columns_.push_back(gate_column(gate));
   scale_is_chosen_ = false;
+  find_pressure_null();
+}
+
+/// A pressure of one everywhere, with that of every gate, must push on no free direction: then it is a null vector.
+void StokesOperator::find_pressure_null() {
+  const int dim = mesh_->dim;
+  const int size = dim + 1;
+  std::vector<Real> push(static_cast<std::size_t>(mesh_->nodes()) * size, 0.0);  // force [N], then volume [m^3]
+  with_element(dim, geometry_, [&]<class Element>(std::type_identity<Element>) {
+    constexpr int D = Element::dim;
+    ElementUnknowns<D> uniform;
+    uniform.pressure.setOnes();
+    ElementLoad<D> expansion;
+    expansion.divergence = -1;
+    for (LocalId e = 0; e < mesh_->elements(); ++e) {
+      if (!(viscosity_[static_cast<std::size_t>(e)] > 0)) continue;
+      const Element element(simplex_points<D>(*mesh_, e));
+      ElementUnknowns<D> sums = element.residual(uniform, 1, 1);
+      sums.pressure = element.load(expansion, 1).pressure;
+      scatter<D>(*mesh_, e, sums, 1, push);
+    }
+  });
+  mesh_->node_halo.add_to_owners(push, size);
+  for (const GateColumn& gate : gate_columns_) {
+    for (std::size_t k = 0; k < gate.nodes.size(); ++k) {
+      Real* place = push.data() + static_cast<std::size_t>(gate.nodes[k]) * size;
+      for (int d = 0; d < dim; ++d) place[d] += gate.values[k * static_cast<std::size_t>(dim) + d];
+    }
+  }
+  Real largest = 0;
+  Real free = 0;
+  node_volume_.resize(static_cast<std::size_t>(mesh_->owned_nodes()));
+  for (LocalId node = 0; node < mesh_->owned_nodes(); ++node) {
+    Real* place = push.data() + static_cast<std::size_t>(node) * size;
+    node_volume_[static_cast<std::size_t>(node)] = place[dim];
+    for (int d = 0; d < dim; ++d) largest = std::max(largest, std::abs(place[d]));
+    constraints_.project(node, place);
+    for (int d = 0; d < dim; ++d) free = std::max(free, std::abs(place[d]));
+  }
+  pressure_is_free_ = comm_->max(free) <= 1e-8 * comm_->max(largest);
+  if (!pressure_is_free_) node_volume_.clear();
+}
+
+void StokesOperator::remove_pressure_mean(StokesState& state) const {
+  if (!pressure_is_free_) return;
+  const auto size = static_cast<std::size_t>(mesh_->dim) + 1;
+  std::array<Real, 2> sums{};
+  for (std::size_t node = 0; node < node_volume_.size(); ++node) {
+    sums[0] += node_volume_[node] * state.nodes[node * size + size - 1];
+    sums[1] += node_volume_[node];
+  }
+  comm_->sum_in_place(sums);
+  const Real mean = sums[1] > 0 ? sums[0] / sums[1] : 0;
+  for (LocalId node = 0; node < mesh_->nodes(); ++node) {
+    if (!constraints_.is_pressure_fixed(node)) state.nodes[static_cast<std::size_t>(node) * size + size - 1] -= mean;
+  }
+  for (Real& pressure : state.borders) pressure -= mean;
+}
+
+/// Makes a residual orthogonal to the null vector by a uniform div v; returns the flow that it takes out [m^3/s].
+Real StokesOperator::remove_net_flow(LinearVector& residual) const {
+  if (!pressure_is_free_) return 0;
+  const auto size = static_cast<std::size_t>(mesh_->dim) + 1;
+  std::array<Real, 2> sums{};
+  for (std::size_t node = 0; node < node_volume_.size(); ++node) {
+    sums[0] += residual.nodes[node * size + size - 1];
+    sums[1] += node_volume_[node];
+  }
+  comm_->sum_in_place(sums);
+  for (const Real value : residual.borders) sums[0] += value;
+  if (!(sums[1] > 0)) return 0;
+  for (std::size_t node = 0; node < node_volume_.size(); ++node) {
+    residual.nodes[node * size + size - 1] -= sums[0] / sums[1] * node_volume_[node];
+  }
+  return -sums[0] / system_.pressure_scale;
 }
 
 void StokesOperator::compute_volumes() {
@@ -129,7 +204,7 @@ void StokesOperator::compute_volumes() {
 
 void StokesOperator::fix_unmodelled_nodes() {
   check(model_ != nullptr, "the operator has a viscosity");
-  model_->evaluate(*mesh_, shear_rate_, viscosity_, slope_);
+  update_viscosity(1.0);  // any rate tells what is modelled
   if (comm_->all(std::all_of(viscosity_.begin(), viscosity_.end(), [](Real eta) { return eta > 0; }))) return;
   std::vector<Real> modelled(static_cast<std::size_t>(mesh_->nodes()), 0.0);
   for (LocalId e = 0; e < mesh_->elements(); ++e) {
@@ -334,7 +409,6 @@ ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& 
     const auto local = static_cast<LocalId>(node);
     constraints_.project(local, place);
     place[dim] *= constraints_.is_pressure_fixed(local) ? 0 : scale;
-    for (int k = 0; k <= dim; ++k) squares[0] += place[k] * place[k];
   }
   result.borders.assign(gates_.size(), 0.0);
   for (std::size_t g = 0; g < gates_.size(); ++g) {
@@ -345,12 +419,12 @@ ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& 
     }
   }
   comm_->sum_in_place(result.borders);
-  comm_->sum_in_place(squares);
-  for (std::size_t g = 0; g < gates_.size(); ++g) {
-    result.borders[g] = scale * (result.borders[g] - gates_[g].flux);
-    squares[0] += result.borders[g] * result.borders[g];
-  }
+  for (std::size_t g = 0; g < gates_.size(); ++g) result.borders[g] = scale * (result.borders[g] - gates_[g].flux);
   ResidualReport report;
+  report.net_flow = remove_net_flow(result);
+  for (const Real value : result.nodes) squares[0] += value * value;
+  comm_->sum_in_place(squares);
+  for (const Real value : result.borders) squares[0] += value * value;
   report.norm = std::sqrt(squares[0]);
   report.reference = std::sqrt(std::max({squares[1], squares[2], 1e-18 * squares[3]}));
   return report;

@@ -45,6 +45,9 @@ struct ResidualReport {
   Real norm = 0;       ///< of the scaled residual, borders included
   Real reference = 0;  ///< of the forces that must balance: assembled internal forces or loads, N
   Real relative() const { return reference > 0 ? norm / reference : norm; }
+  /// Where the pressure is free: the net flow that the prescribed velocities demand, less the volume targets. It has
+  /// been spread over the domain as a uniform div v. m^3/s, outward; 0 elsewhere.
+  Real net_flow = 0;
 };
 
 /// The node with the largest residual of force.
@@ -73,12 +76,15 @@ class StokesOperator {
   void set_loads(StokesLoads loads) { loads_ = std::move(loads); }
   void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
   void set_terms(std::vector<const ResidualTerm*> terms) { terms_ = std::move(terms); }
-  /// Nothing fixes the mean pressure (see LinearSystem). Found by the caller, who knows the boundary.
-  void set_pressure_free(bool is_free) { pressure_is_free_ = is_free; }
-
   /// To be called when constraints, loads, gates, terms or coordinates were set or changed: volumes, couplings,
-  /// halo of the constraints. Collective.
+  /// halo of the constraints; finds whether anything fixes the mean pressure. Elements of zero viscosity are left
+  /// out, nodes that only they have are fixed at rest (or as the constraints say). Collective.
   void prepare();
+  /// Nothing fixes the mean pressure (see LinearSystem).
+  bool pressure_is_free() const noexcept { return pressure_is_free_; }
+  /// Shifts pressures, with those of the gates, to zero mean over the modelled volume where the pressure is free.
+  /// Collective.
+  void remove_pressure_mean(StokesState& state) const;
 
   /// A state of zero velocities and pressures that satisfies the constraints. Local.
   StokesState start_state() const;
@@ -124,6 +130,8 @@ class StokesOperator {
   void compute_volumes();
   void fix_unmodelled_nodes();
   void choose_scale();
+  void find_pressure_null();
+  Real remove_net_flow(LinearVector& residual) const;
   GateColumn gate_column(const FluxGate& gate) const;
   std::vector<Real> unknowns_in_space(const StokesState& state) const;
   Balance balance(const StokesState& state);
@@ -155,6 +163,7 @@ class StokesOperator {
   LinearSystem system_;
   Real length_ = 1;  ///< of a typical element, m
   bool scale_is_chosen_ = false;
+  std::vector<Real> node_volume_;  ///< [owned node] integral of phi over what is modelled, m^3; where pressure is free
   std::vector<GateColumn> gate_columns_;
   std::vector<Real> volume_;
   std::vector<Real> shear_rate_;

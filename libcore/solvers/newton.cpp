@@ -184,6 +184,7 @@ NewtonOutcome Loop::run() {
   } else {
     solve_nonlinear_problem();
   }
+  op_.remove_pressure_mean(state_);
   outcome_.residual = report_.relative();
   return outcome_;
 }
