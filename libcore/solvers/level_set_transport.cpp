@@ -103,9 +103,17 @@ std::vector<char> LevelSetTransport::mark_nodes(std::span<const char> element_ma
 }
 
 Real LevelSetTransport::largest_front_rate(std::span<const Real> level_set) const {
-  std::vector<char> is_cut(rates_.size(), 0);
-  for (const LocalId e : cut_elements(mesh_, level_set)) is_cut[static_cast<std::size_t>(e)] = 1;
-  const std::vector<char> near = mark_nodes(is_cut);
+  // Elements that the front only touches count: it may stand on the faces of a gate.
+  std::vector<char> is_touched(rates_.size(), 0);
+  for (LocalId e = 0; e < mesh_.elements(); ++e) {
+    bool has_inside = false, has_outside = false;
+    for (const LocalId n : mesh_.nodes_of_element(e)) {
+      has_inside = has_inside || level_set[static_cast<std::size_t>(n)] >= 0;
+      has_outside = has_outside || level_set[static_cast<std::size_t>(n)] <= 0;
+    }
+    is_touched[static_cast<std::size_t>(e)] = has_inside && has_outside;
+  }
+  const std::vector<char> near = mark_nodes(is_touched);
   Real rate = 0;
   for (LocalId e = 0; e < mesh_.elements(); ++e) {
     const auto nodes = mesh_.nodes_of_element(e);

@@ -47,8 +47,8 @@ class LevelSetTransport {
   TransportReport advance(std::span<const Real> velocity, std::span<Real> level_set, Real dt,
                           const ImposedLevelSet& imposed);
 
-  /// Largest |v| / h_v [1/s] over the cut elements and those around them: 1 / the time the front takes to cross an
-  /// element. Collective.
+  /// Largest |v| / h_v [1/s] over the elements that the front touches and those around them: 1 / the time the front
+  /// takes to cross an element. Collective.
   Real front_rate(std::span<const Real> velocity, std::span<const Real> level_set);
 
  private:

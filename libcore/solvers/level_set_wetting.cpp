@@ -7,6 +7,8 @@ namespace malleus {
 namespace {
 
 constexpr Real nothing = 1e300;
+/// Slope towards the wall: with none, whole elements would hold one value, and their volume would come and go at once.
+constexpr Real lag = 0.01;
 
 Real distance(const Mesh& mesh, LocalId a, LocalId b) {
   Real square = 0;
@@ -79,7 +81,8 @@ void WallWetting::apply(std::span<Real> level_set) const {
   for (std::size_t pass = 0; pass < passes_.size(); ++pass) {
     std::fill(given.begin(), given.end(), -nothing);
     for (const Transfer& transfer : passes_[pass]) {
-      given[static_cast<std::size_t>(transfer.to)] = level_set[static_cast<std::size_t>(transfer.from)];
+      given[static_cast<std::size_t>(transfer.to)] =
+          level_set[static_cast<std::size_t>(transfer.from)] - lag * distance(mesh_, transfer.from, transfer.to);
     }
     mesh_.node_halo.max_to_owners(given, 1);
     mesh_.node_halo.update_copies(given, 1);

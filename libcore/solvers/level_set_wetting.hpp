@@ -12,8 +12,9 @@ namespace malleus {
 
 /// With no slip, transport never moves the front's contact with the wall, and a film below an element stays on it (gate
 /// pressure 21 to 27 % too low in a channel). So each wall node takes the level set of its nearest node off the wall,
-/// through an edge. A wall node all of whose neighbours lie on the wall takes that of its nearest neighbour that has
-/// one to give. The volume has to be restored afterwards.
+/// through an edge, less a hundredth of the edge (the front meets the wall at 89.4 degrees). A wall node all of whose
+/// neighbours lie on the wall takes that of its nearest neighbour that has one to give. The volume has to be restored
+/// afterwards.
 class WallWetting {
  public:
   /// is_wall: [node], alike on all holders of a node. Collective.

@@ -1,0 +1,371 @@
+#include "inject/flow.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/error.hpp"
+#include "base/log.hpp"
+#include "fem/level_set_volume.hpp"
+#include "mesh/space_filling_curve.hpp"
+
+namespace malleus::inject {
+namespace {
+
+/// Share of the dissipation that may change before the flow is solved again whatever the front did.
+constexpr Real dissipation_guard = 0.2;
+/// Steps are planned at the speed before them: the share of the distance that counts as all of it.
+constexpr Real nearly = 0.75;
+
+FieldSpec velocity_spec(int dim) {
+  return {"velocity", "m/s", Support::node, dim, Transfer::interpolate, false};
+}
+
+}  // namespace
+
+Flow::Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state)
+    : scene_(scene), mixture_(mixture), fronts_(fronts), state_(state) {
+  state_.gates.resize(scene.settings.inlets.size());
+  scene_.fields.declare(scene_.mesh, velocity_spec(scene_.mesh.dim));
+  scene_.fields.declare(scene_.mesh, {"pressure", "Pa", Support::node, 1, Transfer::interpolate, false});
+  scene_.fields.declare(scene_.mesh, {"viscosity", "Pa.s", Support::element, 1, Transfer::interpolate, true});
+  scene_.fields.declare(scene_.mesh, {"strain_rate", "1/s", Support::element, 1, Transfer::interpolate, true});
+  rebuild();
+}
+
+std::string Flow::purpose() const {
+  const FlowUpdate& update = scene_.settings.flow.update;
+  std::string when = "once";
+  if (update.kind == FlowUpdate::Kind::every) when = fmt::format("every {} increments", update.every);
+  if (update.kind == FlowUpdate::Kind::automatic) {
+    const Real distance = scene_.settings.flow.update_distance;
+    when = distance > 0 ? fmt::format("when the front has moved {:g} elements", distance) : "every increment";
+  }
+  return fronts_.size() == 0 ? "solves the Stokes equations"
+                             : fmt::format("solves the Stokes equations of the mixture, {}", when);
+}
+
+FieldUse Flow::uses() const {
+  return {fronts_.names(), {"velocity", "pressure", "viscosity", "strain_rate"}, {"velocity", "pressure"}};
+}
+
+void Flow::rebuild() {
+  operator_ = std::make_unique<StokesOperator>(scene_.comm, scene_.mesh, scene_.geometry);
+  operator_->set_viscosity(mixture_);
+  linear_.reset();
+  unknowns_ = {};
+  is_solved_ = false;
+}
+
+void Flow::start() {
+  const Outcome outcome = solve(0);
+  if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
+}
+
+Outcome Flow::solve_once() {
+  return is_solved_ ? Outcome::done() : solve(0);
+}
+
+Outcome Flow::advance(const Increment& increment) {
+  state_.flow_updated = increment.number == 1;  // start() solved it for this increment
+  ++state_.increments_since_flow;
+  if (is_due(present_drives(increment.start()))) {
+    const Outcome outcome = solve(increment.start());
+    if (outcome.kind != Outcome::Kind::done) return outcome;
+    state_.flow_updated = true;
+  }
+  state_.seconds_since_flow += increment.dt;
+  return Outcome::done();
+}
+
+std::vector<GateDrive> Flow::present_drives(Real time) {
+  std::vector<GateDrive> drives = asked_drives(scene_, time);
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const InletSettings& inlet = scene_.settings.inlets[i];
+    if (!state_.gates[i].switched && inlet.switch_fill && state_.filled >= *inlet.switch_fill * scene_.cavity) {
+      state_.gates[i].switched = true;
+      log::info("inlet {} switches over to {:.4g} Pa at a fill of {:.4g}", inlet.name, *inlet.then_pressure,
+                state_.filled / scene_.cavity);
+    }
+    if (state_.gates[i].switched) drives[i] = {GateDrive::Kind::pressure, *inlet.then_pressure};
+  }
+  return drives;
+}
+
+bool Flow::is_due(const std::vector<GateDrive>& drives) {
+  if (!is_solved_) return true;
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const GateDrive& present = state_.gates[i].drive;
+    if (drives[i].kind != present.kind || drives[i].value != present.value) return true;
+  }
+  const FlowSettings& flow = scene_.settings.flow;
+  if (fronts_.size() == 0 || flow.update.kind == FlowUpdate::Kind::once) return false;
+  if (flow.update.kind == FlowUpdate::Kind::every) return state_.increments_since_flow > flow.update.every;
+  return state_.travelled >= nearly * flow.update_distance || dissipation_changed();
+}
+
+/// sum V |eta_new - eta_old| gamma^2 over sum V eta_new gamma^2, with the flow as it was.
+bool Flow::dissipation_changed() {
+  refresh_mixture();
+  const std::span<const Real> rate = operator_->shear_rate();
+  const std::span<const Real> old_viscosity = operator_->viscosity();
+  std::vector<Real> viscosity(rate.size());
+  std::vector<Real> slope(rate.size());
+  mixture_.evaluate(scene_.mesh, rate, viscosity, slope);
+  std::array<Real, 2> sums = {0, 0};
+  for (std::size_t e = 0; e < rate.size(); ++e) {
+    const Real weight = scene_.measures[e] * rate[e] * rate[e];
+    sums[0] += weight * std::abs(viscosity[e] - old_viscosity[e]);
+    sums[1] += weight * viscosity[e];
+  }
+  scene_.comm.sum_in_place(sums);
+  return sums[0] > dissipation_guard * sums[1];
+}
+
+void Flow::refresh_mixture() {
+  mixture_.update(scene_.mesh, fronts_.level_sets());
+}
+
+/// A wall with `only = FLUID` holds the nodes that this fluid reaches.
+StickingNodes Flow::sticking_nodes() const {
+  StickingNodes sticks(static_cast<std::size_t>(scene_.mesh.nodes()), 0);
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::wall)) {
+    const int only = scene_.settings.fluid_index(scene_.settings.walls[part->index].only);
+    if (only < 0) continue;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (!part->normals.is_on(node)) continue;
+      bool in_background = true;
+      bool is_there = false;
+      for (const FluidLevelSet& level_set : fronts_.level_sets()) {
+        const bool inside = level_set.values[static_cast<std::size_t>(node)] > 0;
+        in_background = in_background && !inside;
+        is_there = is_there || (inside && level_set.fluid == only);
+      }
+      sticks[static_cast<std::size_t>(node)] = is_there || (in_background && only == mixture_.background());
+    }
+  }
+  return sticks;
+}
+
+Outcome Flow::solve(Real time) {
+  refresh_mixture();
+  std::vector<GateDrive> drives = present_drives(time);
+  const auto velocity = scene_.fields["velocity"].values();
+  const std::vector<Real> old_velocity(velocity.begin(), velocity.end());
+  const bool was_solved = is_solved_;
+  Outcome outcome = solve_with(drives, time);
+  if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time);
+  if (outcome.kind != Outcome::Kind::done) return outcome;
+  if (was_solved) note_freezing(old_velocity);
+  state_.travelled = 0;
+  state_.seconds_since_flow = 0;
+  state_.increments_since_flow = 0;
+  return outcome;
+}
+
+/// Gates whose pressure has reached the one at which they switch. Returns whether there were any.
+bool Flow::switch_over(std::vector<GateDrive>& drives) {
+  bool any = false;
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const InletSettings& inlet = scene_.settings.inlets[i];
+    GateState& gate = state_.gates[i];
+    if (gate.switched || !inlet.switch_pressure || gate.pressure < *inlet.switch_pressure) continue;
+    log::info("inlet {} switches over to {:.4g} Pa at a pressure of {:.4g} Pa", inlet.name, *inlet.then_pressure,
+              gate.pressure);
+    gate.switched = true;
+    drives[i] = {GateDrive::Kind::pressure, *inlet.then_pressure};
+    any = true;
+  }
+  return any;
+}
+
+NewtonOptions Flow::newton_options(const std::vector<GateDrive>& drives) const {
+  (void)drives;
+  const SolverSettings& solver = scene_.settings.common.solver;
+  NewtonOptions options;
+  options.tolerance = solver.newton_tolerance;
+  options.linear_tolerance = solver.linear_tolerance;
+  options.max_iterations = solver.max_newton;
+  options.start_shear_rate = typical_shear_rate(scene_);
+  return options;
+}
+
+Outcome Flow::solve_with(std::vector<GateDrive> drives, Real time) {
+  FlowConditions conditions = make_conditions(scene_, mixture_, drives, sticking_nodes(), time);
+  pressure_is_free_ = conditions.pressure_is_free;
+  operator_->set_constraints(std::move(conditions.constraints));
+  operator_->set_loads(std::move(conditions.loads));
+  operator_->set_gates(conditions.gates);
+  operator_->set_pressure_free(pressure_is_free_);
+  operator_->prepare();
+  StokesState unknowns = is_solved_ ? unknowns_ : operator_->start_state();
+  operator_->impose_constraints(unknowns);
+  const NewtonOutcome newton = NewtonSolver(newton_options(drives)).solve(*operator_, linear_, unknowns);
+  totals_.solves += newton.linear_solves;
+  totals_.iterations += newton.linear_iterations;
+  totals_.assembly_s += newton.assembly_seconds;
+  totals_.setup_s += newton.setup_seconds;
+  totals_.solve_s += newton.solve_seconds;
+  if (!newton.converged) {
+    ++totals_.failures;
+    return Outcome::fail(newton.reason);
+  }
+  unknowns_ = std::move(unknowns);
+  is_solved_ = true;
+  ++state_.flow_solves;
+  publish(drives, conditions);
+  return Outcome::done();
+}
+
+/// Zero mean over the cavity, gates' unknowns alike.
+void Flow::remove_mean_pressure() {
+  const int block = scene_.mesh.dim + 1;
+  Real sum = 0;
+  for (LocalId e = 0; e < scene_.mesh.elements(); ++e) {
+    Real mean = 0;
+    for (const LocalId node : scene_.mesh.nodes_of_element(e)) {
+      mean += unknowns_.nodes[static_cast<std::size_t>(node) * block + scene_.mesh.dim] / block;
+    }
+    sum += scene_.measures[static_cast<std::size_t>(e)] * mean;
+  }
+  const Real mean = scene_.comm.sum(sum) / scene_.cavity;
+  for (std::size_t at = static_cast<std::size_t>(scene_.mesh.dim); at < unknowns_.nodes.size(); at += block) {
+    unknowns_.nodes[at] -= mean;
+  }
+  for (Real& border : unknowns_.borders) border -= mean;
+}
+
+void Flow::publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions) {
+  if (pressure_is_free_) remove_mean_pressure();
+  const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
+  const std::span<Real> velocity = scene_.fields["velocity"].values();
+  const std::span<Real> pressure = scene_.fields["pressure"].values();
+  for (std::size_t node = 0; node < pressure.size(); ++node) {
+    std::copy_n(unknowns_.nodes.data() + node * (dim + 1), dim, velocity.data() + node * dim);
+    pressure[node] = unknowns_.nodes[node * (dim + 1) + dim];
+  }
+  const std::span<Real> viscosity = scene_.fields["viscosity"].values();
+  const std::span<Real> strain_rate = scene_.fields["strain_rate"].values();
+  operator_->update_viscosity(unknowns_);
+  for (std::size_t e = 0; e < viscosity.size(); ++e) {
+    viscosity[e] = operator_->viscosity()[e];
+    strain_rate[e] = operator_->shear_rate()[e] / std::sqrt(3.0);
+  }
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    GateState& gate = state_.gates[part->index];
+    gate.drive = drives[part->index];
+    gate.flow = -outflow(scene_, part->facets, velocity);
+    gate.pressure =
+        gate.drive.kind == GateDrive::Kind::pressure ? gate.drive.value : surface_mean(scene_, *part, pressure);
+  }
+  for (std::size_t g = 0; g < conditions.gate_inlets.size(); ++g) {
+    state_.gates[conditions.gate_inlets[g]].pressure = unknowns_.borders[g];
+  }
+}
+
+void Flow::note_freezing(std::span<const Real> old_velocity) {
+  if (fronts_.size() == 0 || state_.seconds_since_flow == 0) return;
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  Real largest = 0;  // change of the front's speed over the local size, 1/s
+  with_dim(scene_.mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (std::size_t i = 0; i < fronts_.size(); ++i) {
+      const std::span<const Real> level_set = fronts_.values(i);
+      for (const LocalId e : cut_elements(scene_.mesh, level_set)) {
+        const auto p1 = p1_gradients<D>(simplex_points<D>(scene_.mesh, e));
+        Point<D> slope = Point<D>::Zero();
+        Point<D> change = Point<D>::Zero();
+        for (int k = 0; k <= D; ++k) {
+          const auto node = static_cast<std::size_t>(scene_.mesh.nodes_of_element(e)[static_cast<std::size_t>(k)]);
+          slope += level_set[node] * p1.gradients.col(k);
+          for (int c = 0; c < D; ++c) {
+            const auto at = node * D + static_cast<std::size_t>(c);
+            change[c] += (velocity[at] - old_velocity[at]) / (D + 1);
+          }
+        }
+        if (!(slope.norm() > 0)) continue;
+        const Real size = std::pow(p1.volume * (D == 2 ? 2.31 : 8.49), 1.0 / D);  // edge of the regular simplex
+        largest = std::max(largest, std::abs(change.dot(slope.normalized())) / size);
+      }
+    }
+  });
+  freezing_error_ += 0.5 * state_.seconds_since_flow * scene_.comm.max(largest);
+}
+
+nlohmann::json Flow::save() const {
+  return {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}, {"pressure_is_free", pressure_is_free_}};
+}
+
+void Flow::load(const nlohmann::json& saved) {
+  freezing_error_ = saved.at("freezing_error");
+  const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  const std::span<const Real> pressure = scene_.fields["pressure"].values();
+  unknowns_.borders = saved.at("borders").get<std::vector<Real>>();
+  unknowns_.nodes.resize(pressure.size() * (dim + 1));
+  for (std::size_t node = 0; node < pressure.size(); ++node) {
+    std::copy_n(velocity.data() + node * dim, dim, unknowns_.nodes.data() + node * (dim + 1));
+    unknowns_.nodes[node * (dim + 1) + dim] = pressure[node];
+  }
+  pressure_is_free_ = saved.at("pressure_is_free");
+  is_solved_ = true;
+  refresh_mixture();
+  operator_->update_viscosity(unknowns_);
+}
+
+PrescribedFlow::PrescribedFlow(Scene& scene, FillingState& state) : scene_(scene), state_(state) {
+  state_.gates.resize(scene.settings.inlets.size());
+  scene_.fields.declare(scene_.mesh, velocity_spec(scene_.mesh.dim));
+}
+
+Outcome PrescribedFlow::advance(const Increment& increment) {
+  evaluate(increment.start());
+  return Outcome::done();
+}
+
+void PrescribedFlow::evaluate(Real time) {
+  const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
+  const std::span<Real> velocity = scene_.fields["velocity"].values();
+  std::vector<Real> component(static_cast<std::size_t>(scene_.mesh.nodes()));
+  bool is_finite = true;
+  for (std::size_t c = 0; c < dim; ++c) {
+    const auto& formula = scene_.settings.flow.prescribed[c];
+    std::fill(component.begin(), component.end(), 0);
+    if (formula) formula->evaluate(scene_.mesh.coordinates, scene_.mesh.dim, time, component);
+    for (std::size_t node = 0; node < component.size(); ++node) {
+      is_finite = is_finite && std::isfinite(component[node]);
+      velocity[node * dim + c] = component[node];
+    }
+  }
+  if (!scene_.comm.all(is_finite)) {
+    throw InputError(fmt::format("[flow] prescribed: the velocity is not a number everywhere at {:.6g} s", time));
+  }
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    state_.gates[part->index].flow = -outflow(scene_, part->facets, velocity);
+  }
+}
+
+Real typical_shear_rate(const Scene& scene) {
+  const Box box = bounding_box(scene.comm, scene.mesh.coordinates, scene.mesh.dim);
+  Real height = 1e300;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(scene.mesh.dim); ++c) {
+    height = std::min(height, box.high[c] - box.low[c]);
+  }
+  Real rate = 0;
+  const std::vector<GateDrive> drives = asked_drives(scene, 0);
+  for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::inlet)) {
+    const Real gap = std::min(height, scene.mesh.dim == 2 ? part->area : std::sqrt(part->area));
+    if (drives[part->index].kind == GateDrive::Kind::pressure) continue;
+    rate = std::max(rate, std::abs(drives[part->index].value) / part->area / gap);
+  }
+  for (const BoundarySettings& boundary : scene.settings.common.boundaries) {
+    for (const auto& component : boundary.imposed_velocity()) {
+      if (component && component->is_constant()) rate = std::max(rate, std::abs((*component)({}, 0)) / height);
+    }
+  }
+  return rate > 0 ? rate : 1;
+}
+
+}  // namespace malleus::inject

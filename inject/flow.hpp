@@ -1,0 +1,89 @@
+#pragma once
+
+/// The flow component: velocity and pressure of the fluids as the front lies now.
+
+#include <nlohmann/json.hpp>
+
+#include "engine/component.hpp"
+#include "engine/process.hpp"
+#include "inject/filling_state.hpp"
+#include "inject/flow_conditions.hpp"
+#include "inject/front_set.hpp"
+#include "solvers/newton.hpp"
+
+namespace malleus::inject {
+
+/// Solves the Stokes equations for the mixture (paper, eq. [1] with [9]) when the front has moved far enough since the
+/// last solve, and keeps the flow in between. Fields: velocity, pressure, viscosity, strain_rate.
+class Flow final : public Component {
+ public:
+  Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state);
+
+  std::string name() const override { return "flow"; }
+  std::string purpose() const override;
+  FieldUse uses() const override;
+  void start() override;
+  Outcome advance(const Increment& increment) override;
+  Outcome solve_once() override;
+
+  /// After the mesh and the fields were replaced. Collective.
+  void rebuild();
+
+  const LinearTotals& linear_totals() const { return totals_; }
+  bool pressure_is_free() const { return pressure_is_free_; }
+  /// Distance [elements] that freezing the flow between solves misplaced the front, summed over the solves: half of the
+  /// time between two solves times the change of the normal velocity.
+  Real freezing_error() const { return freezing_error_; }
+  nlohmann::json save() const;
+  void load(const nlohmann::json& saved);
+
+ private:
+  std::vector<GateDrive> present_drives(Real time);
+  bool is_due(const std::vector<GateDrive>& drives);
+  bool dissipation_changed();
+  Outcome solve(Real time);
+  Outcome solve_with(std::vector<GateDrive> drives, Real time);
+  bool switch_over(std::vector<GateDrive>& drives);
+  void publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions);
+  void remove_mean_pressure();
+  void refresh_mixture();
+  StickingNodes sticking_nodes() const;
+  void note_freezing(std::span<const Real> old_velocity);
+  NewtonOptions newton_options(const std::vector<GateDrive>& drives) const;
+
+  Scene& scene_;
+  Mixture& mixture_;
+  FrontSet& fronts_;
+  FillingState& state_;
+  std::unique_ptr<StokesOperator> operator_;
+  StokesLinearSolver linear_;
+  StokesState unknowns_;
+  LinearTotals totals_;
+  bool is_solved_ = false;
+  bool pressure_is_free_ = false;
+  Real freezing_error_ = 0;
+};
+
+/// A flow that the case prescribes: formulas of place and time. Field: velocity.
+class PrescribedFlow final : public Component {
+ public:
+  PrescribedFlow(Scene& scene, FillingState& state);
+
+  std::string name() const override { return "flow"; }
+  std::string purpose() const override { return "takes the velocity that the case prescribes"; }
+  FieldUse uses() const override { return {{}, {"velocity"}, {"velocity"}}; }
+  void start() override { evaluate(0); }
+  Outcome advance(const Increment& increment) override;
+
+  /// Velocity field and flow through the inlets at a time [s]. Collective.
+  void evaluate(Real time);
+
+ private:
+  Scene& scene_;
+  FillingState& state_;
+};
+
+/// Shear rate [1/s] typical of the case, speed over gap: for power laws' cut-off and the first iteration. Collective.
+Real typical_shear_rate(const Scene& scene);
+
+}  // namespace malleus::inject

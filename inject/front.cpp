@@ -1,0 +1,259 @@
+#include "inject/front.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.hpp"
+#include "base/log.hpp"
+#include "fem/cut_simplex.hpp"
+#include "fem/level_set_volume.hpp"
+#include "solvers/level_set_redistance.hpp"
+
+namespace malleus::inject {
+namespace {
+
+constexpr Real not_filled = -1;
+
+/// Share of a facet in which a level set is positive.
+Real facet_share(const Mesh& mesh, LocalId facet, std::span<const Real> level_set) {
+  std::array<Real, 3> values;
+  const auto nodes = mesh.nodes_of_facet(facet);
+  for (std::size_t i = 0; i < nodes.size(); ++i) values[i] = level_set[static_cast<std::size_t>(nodes[i])];
+  return positive_fraction({values.data(), nodes.size()});
+}
+
+/// Flow out through one facet [m^3/s].
+Real facet_outflow(const Scene& scene, LocalId facet, std::span<const Real> velocity) {
+  return with_dim(scene.mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    const FacetIntegrals<D> integrals = facet_integrals<D>(scene.mesh, facet, scene.geometry);
+    const auto shares = integrals.shares();
+    Real flow = 0;
+    for (int i = 0; i < D; ++i) {
+      const auto node = static_cast<std::size_t>(scene.mesh.nodes_of_facet(facet)[static_cast<std::size_t>(i)]);
+      flow += shares[i] * integrals.normal.dot(Eigen::Map<const Point<D>>(velocity.data() + node * D));
+    }
+    return flow;
+  });
+}
+
+}  // namespace
+
+Front::Front(Scene& scene, FrontSet& fronts, FillingState& state, std::function<void(Real)> renew_velocity)
+    : scene_(scene), fronts_(fronts), state_(state), renew_velocity_(std::move(renew_velocity)) {
+  scene_.fields.declare(scene_.mesh, {"fill_time", "s", Support::node, 1, Transfer::interpolate, false});
+  rebuild();
+}
+
+std::string Front::purpose() const {
+  return fmt::format("moves the front{} in substeps of {:g} elements, wets the walls, restores the volume",
+                     fronts_.size() > 1 ? "s" : "", scene_.settings.front.cfl);
+}
+
+FieldUse Front::uses() const {
+  std::vector<std::string> written = fronts_.names();
+  written.emplace_back("fill_time");
+  return {{"velocity"}, written, written};
+}
+
+void Front::rebuild() {
+  const FrontSettings& front = scene_.settings.front;
+  TransportOptions options;
+  options.stabilization = front.stabilization();
+  options.front_cfl = front.cfl;
+  options.narrow_band = front.narrow_band.value_or(0);
+  transport_ = std::make_unique<LevelSetTransport>(scene_.comm, scene_.mesh, scene_.graph, options);
+  wetting_ = std::make_unique<WallWetting>(scene_.comm, scene_.mesh, scene_.graph, wetted_nodes());
+}
+
+/// Nodes of the walls on which fluid stands still, those of gates apart: there the level set is imposed.
+std::vector<char> Front::wetted_nodes() const {
+  std::vector<char> wetted = sticking_walls(scene_);
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (part->normals.is_on(node)) wetted[static_cast<std::size_t>(node)] = 0;
+    }
+  }
+  return wetted;
+}
+
+void Front::start() {
+  fronts_.set_initial();
+  targets_.clear();
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    targets_.push_back(positive_volume(scene_.comm, scene_.mesh, scene_.measures, fronts_.values(i)));
+  }
+  const std::vector<Real> filled = union_of_fronts();
+  const std::span<Real> fill_time = scene_.fields["fill_time"].values();
+  for (std::size_t n = 0; n < filled.size(); ++n) fill_time[n] = filled[n] > 0 ? 0 : not_filled;
+  state_.initial = state_.filled = positive_volume(scene_.comm, scene_.mesh, scene_.measures, filled);
+}
+
+std::vector<Real> Front::union_of_fronts() const {
+  std::vector<Real> largest(static_cast<std::size_t>(scene_.mesh.nodes()), -1e300);
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    const std::span<const Real> values = std::as_const(fronts_).values(i);
+    for (std::size_t n = 0; n < largest.size(); ++n) largest[n] = std::max(largest[n], values[n]);
+  }
+  return largest;
+}
+
+Real Front::rate() {
+  Real rate = 0;
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    rate = std::max(rate, transport_->front_rate(scene_.fields["velocity"].values(), fronts_.values(i)));
+  }
+  return rate;
+}
+
+Outcome Front::advance(const Increment& increment) {
+  snapshot();
+  substeps_ = 0;
+  Real left = increment.dt;
+  while (left > 0) {
+    const Real start = increment.time - left;
+    if (renew_velocity_) renew_velocity_(start);
+    const Real fastest = rate();
+    const Real wanted = std::ceil(left * fastest / scene_.settings.front.cfl - 1e-6);
+    const int parts = static_cast<int>(std::clamp(wanted, 1.0, 1e6));
+    const Real dt = left / parts;
+    if (renew_velocity_) renew_velocity_(start + 0.5 * dt);
+    const Outcome outcome = substep(start, dt);
+    if (outcome.kind != Outcome::Kind::done) {
+      roll_back();
+      return outcome;
+    }
+    state_.travelled += dt * fastest;
+    ++substeps_;
+    left = parts == 1 ? 0 : left - dt;
+  }
+  return Outcome::done();
+}
+
+Outcome Front::substep(Real start, Real dt) {
+  const std::vector<Real> before = union_of_fronts();
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    const std::span<Real> level_set = fronts_.values(i);
+    const Exchange through = exchange(i);
+    const TransportReport report = transport_->advance(velocity, level_set, dt, imposed(i, dt));
+    if (!report.converged) return Outcome::retry("the transport of the front did not converge");
+    wetting_->apply(level_set);
+    const bool may_redistance = scene_.settings.front.redistance == FrontSettings::Redistance::on_demand;
+    if (may_redistance && should_redistance(front_slope(scene_.comm, scene_.mesh, level_set))) {
+      redistance(scene_.comm, scene_.mesh, scene_.graph, scene_.measures, level_set);
+      ++redistances_;
+    }
+    targets_[i] += (through.entering - through.leaving) * dt;
+    restore_volume(scene_.comm, scene_.mesh, scene_.measures, level_set, targets_[i]);
+    state_.left += through.leaving * dt;
+  }
+  state_.injected += state_.inflow() * dt;
+  mark_fill_time(before, start, dt);
+  return Outcome::done();
+}
+
+Front::Exchange Front::exchange(std::size_t front) const {
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  const std::span<const Real> level_set = std::as_const(fronts_).values(front);
+  std::vector<signed char> inlet_share(static_cast<std::size_t>(scene_.mesh.exterior_facets), -1);
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    const bool is_ours = scene_.settings.fluid_index(scene_.settings.inlets[part->index].fluid) == fronts_.fluid(front);
+    for (const LocalId f : part->facets) inlet_share[static_cast<std::size_t>(f)] = is_ours ? 1 : 0;
+  }
+  std::array<Real, 2> sums = {0, 0};
+  for (LocalId f = 0; f < scene_.mesh.exterior_facets; ++f) {
+    const Real out = facet_outflow(scene_, f, velocity);
+    if (out == 0) continue;
+    const signed char known = inlet_share[static_cast<std::size_t>(f)];
+    const Real share = known >= 0 && out < 0 ? known : facet_share(scene_.mesh, f, level_set);
+    sums[out < 0 ? 0 : 1] += std::abs(out) * share;
+  }
+  scene_.comm.sum_in_place(sums);
+  return {sums[0], sums[1]};
+}
+
+/// At an inlet of the fluid the level set grows as the front moves away, at another fluid's it falls; through vents the
+/// background comes back; through the rest of the boundary what stands there.
+ImposedLevelSet Front::imposed(std::size_t front, Real dt) const {
+  const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  const std::span<const Real> level_set = std::as_const(fronts_).values(front);
+  ImposedLevelSet result;
+  std::vector<char> is_done(level_set.size(), 0);
+  const auto impose = [&](LocalId node, Real value) {
+    if (is_done[static_cast<std::size_t>(node)] != 0) return;
+    is_done[static_cast<std::size_t>(node)] = 1;
+    result.nodes.push_back(node);
+    result.values.push_back(value);
+  };
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    const Real flow = state_.gates[part->index].flow;
+    if (!(flow > 0)) continue;
+    const bool is_ours = scene_.settings.fluid_index(scene_.settings.inlets[part->index].fluid) == fronts_.fluid(front);
+    const Real way = flow / part->area * dt;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (!part->normals.is_on(node)) continue;
+      const Real value = level_set[static_cast<std::size_t>(node)];
+      impose(node, is_ours ? std::max(value, 0.0) + way : std::min(value, 0.0) - way);
+    }
+  }
+  for (const BoundaryPart& part : scene_.parts) {
+    if (part.kind != BoundaryPart::Kind::vent && part.kind != BoundaryPart::Kind::imposed) continue;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (!part.normals.is_on(node)) continue;
+      Real inward = 0;
+      for (std::size_t c = 0; c < dim; ++c) {
+        inward -= velocity[static_cast<std::size_t>(node) * dim + c] * part.normals.direction(node, 0)[c];
+      }
+      if (!(inward > 0)) continue;
+      const Real value = level_set[static_cast<std::size_t>(node)];
+      impose(node, part.kind == BoundaryPart::Kind::vent ? std::min(value, 0.0) - inward * dt : value);
+    }
+  }
+  return result;
+}
+
+void Front::mark_fill_time(const std::vector<Real>& before, Real start, Real dt) {
+  const std::vector<Real> after = union_of_fronts();
+  const std::span<Real> fill_time = scene_.fields["fill_time"].values();
+  for (std::size_t n = 0; n < after.size(); ++n) {
+    if (fill_time[n] != not_filled || !(after[n] > 0)) continue;
+    const Real share = before[n] < 0 ? -before[n] / (after[n] - before[n]) : 0;
+    fill_time[n] = start + share * dt;
+  }
+}
+
+void Front::snapshot() {
+  saved_level_sets_.clear();
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    const auto values = fronts_.values(i);
+    saved_level_sets_.emplace_back(values.begin(), values.end());
+  }
+  const auto fill_time = scene_.fields["fill_time"].values();
+  saved_fill_time_.assign(fill_time.begin(), fill_time.end());
+  saved_targets_ = targets_;
+  saved_state_ = state_;
+}
+
+void Front::roll_back() {
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    std::copy(saved_level_sets_[i].begin(), saved_level_sets_[i].end(), fronts_.values(i).begin());
+  }
+  std::copy(saved_fill_time_.begin(), saved_fill_time_.end(), scene_.fields["fill_time"].values().begin());
+  targets_ = saved_targets_;
+  state_ = saved_state_;
+}
+
+nlohmann::json Front::save() const {
+  return {{"targets", targets_}, {"redistances", redistances_}};
+}
+
+void Front::load(const nlohmann::json& saved) {
+  targets_ = saved.at("targets").get<std::vector<Real>>();
+  redistances_ = saved.at("redistances");
+}
+
+}  // namespace malleus::inject

@@ -1,0 +1,70 @@
+#include "inject/front_set.hpp"
+
+#include <algorithm>
+
+#include "mesh/space_filling_curve.hpp"
+#include "solvers/facet_distance.hpp"
+
+namespace malleus::inject {
+
+FrontSet::FrontSet(Scene& scene) : scene_(scene) {
+  const InjectCase& settings = scene.settings;
+  for (int fluid = 0; fluid < static_cast<int>(settings.fluids.size()); ++fluid) {
+    if (fluid != settings.initial_fluid()) fluids_.push_back(fluid);
+  }
+  for (const int fluid : fluids_) {
+    names_.push_back(fluids_.size() == 1 ? "level_set"
+                                         : "level_set_" + settings.fluids[static_cast<std::size_t>(fluid)].name);
+    scene.fields.declare(scene.mesh, {names_.back(), "m", Support::node, 1, Transfer::interpolate, false});
+  }
+}
+
+std::vector<FluidLevelSet> FrontSet::level_sets() const {
+  std::vector<FluidLevelSet> sets;
+  for (std::size_t i = 0; i < size(); ++i) sets.push_back({fluids_[i], values(i)});
+  return sets;
+}
+
+std::vector<Real> FrontSet::behind_inlets(int fluid) const {
+  std::vector<DistanceFacet> facets;
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    if (scene_.settings.fluid_index(scene_.settings.inlets[part->index].fluid) != fluid) continue;
+    for (const LocalId f : part->facets) {
+      DistanceFacet facet;
+      const auto nodes = scene_.mesh.nodes_of_facet(f);
+      for (std::size_t i = 0; i < nodes.size(); ++i) {
+        std::copy_n(scene_.mesh.point(nodes[i]), scene_.mesh.dim,
+                    facet.vertices.data() + i * static_cast<std::size_t>(scene_.mesh.dim));
+      }
+      for (const LocalId node : nodes) {
+        facet.node = node;
+        facets.push_back(facet);
+      }
+    }
+  }
+  // Without inlet the fluid is nowhere: farther away than any point of the cavity.
+  const Box box = bounding_box(scene_.comm, scene_.mesh.coordinates, scene_.mesh.dim);
+  Real far = 0;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(scene_.mesh.dim); ++c) far += box.high[c] - box.low[c];
+  std::vector<Real> level_set = distance_to_facets(scene_.comm, scene_.mesh, scene_.graph, facets, far);
+  for (Real& value : level_set) value = -value;
+  return level_set;
+}
+
+void FrontSet::set_initial() {
+  for (std::size_t i = 0; i < size(); ++i) {
+    const std::vector<Real> at_gate = behind_inlets(fluids_[i]);
+    std::copy(at_gate.begin(), at_gate.end(), values(i).begin());
+    for (const InitialShape& shape : scene_.settings.shapes) {
+      if (scene_.settings.fluid_index(shape.fluid) != fluids_[i]) continue;
+      for (LocalId n = 0; n < scene_.mesh.nodes(); ++n) {
+        std::array<Real, 3> place = {0, 0, 0};
+        std::copy_n(scene_.mesh.point(n), scene_.mesh.dim, place.begin());
+        Real& value = values(i)[static_cast<std::size_t>(n)];
+        value = std::max(value, shape.signed_distance(place, scene_.mesh.dim));
+      }
+    }
+  }
+}
+
+}  // namespace malleus::inject

@@ -1,0 +1,270 @@
+#include "inject/process.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/log.hpp"
+#include "fem/solution_errors.hpp"
+
+namespace malleus::inject {
+namespace {
+
+constexpr Real unlimited = std::numeric_limits<Real>::infinity();
+/// Elements that the front may cross in an increment where the flow stays as it is: what an output shows.
+constexpr Real frozen_stride = 4;
+/// Away from power-law scenes the shear-rate cut-off plays no part.
+Real cut_off(const Scene& scene) {
+  return scene.settings.common.solver.cutoff_strain_rate * typical_shear_rate(scene);
+}
+
+KnownFunction at_time(const Expression& formula, int dim, Real time) {
+  return [&formula, dim, time](std::span<const Real> coordinates, std::span<Real> values) {
+    formula.evaluate(coordinates, dim, time, values);
+  };
+}
+
+}  // namespace
+
+Real allowed_contrast(const InjectCase& settings) {
+  if (settings.front.contrast) return *settings.front.contrast;
+  const bool is_filling = settings.fluids.size() > 1 && !settings.inlets.empty() && settings.time.increments != 0;
+  return is_filling ? 1e4 : unlimited;
+}
+
+FillingProcess::FillingProcess(const Communicator& comm, Mesh mesh, const InjectCase& settings)
+    : scene_(comm, std::move(mesh), settings), fronts_(scene_) {
+  mixture_ = std::make_unique<Mixture>(make_fluids(settings, cut_off(scene_), allowed_contrast(settings)),
+                                       settings.initial_fluid(), settings.front.mixture, settings.front.thickness);
+  thin_ = find_thin_sections(scene_);
+  warn_of(thin_);
+  if (!settings.common.probes.empty()) {
+    probes_ = std::make_unique<Probes>(comm, scene_.mesh, settings.common.probes);
+  }
+}
+
+void FillingProcess::add_flow() {
+  flow_ = std::make_unique<Flow>(scene_, *mixture_, fronts_, state_);
+  order_.push_back(flow_.get());
+}
+
+void FillingProcess::add_prescribed_flow() {
+  prescribed_ = std::make_unique<PrescribedFlow>(scene_, state_);
+  order_.push_back(prescribed_.get());
+}
+
+void FillingProcess::add_front() {
+  std::function<void(Real)> renew;
+  if (prescribed_) renew = [this](Real time) { prescribed_->evaluate(time); };
+  front_ = std::make_unique<Front>(scene_, fronts_, state_, std::move(renew));
+  order_.push_back(front_.get());
+}
+
+void FillingProcess::add_filling() {
+  filling_ = std::make_unique<Filling>(scene_, fronts_, state_);
+  order_.push_back(filling_.get());
+}
+
+std::vector<LeftOut> FillingProcess::left_out() const {
+  std::vector<LeftOut> left = {{"heat equation", "no [thermal] section"}, {"inertia", "no [inertia] section"}};
+  if (!scene_.settings.common.gravity) left.push_back({"weight", "no [gravity] section"});
+  if (!has_fronts()) left.push_back({"front, mixture, filling", "one fluid"});
+  if (prescribed_) left.push_back({"Stokes equations", "[flow] prescribes the velocity"});
+  left.push_back({"remeshing", "no [remesh] section"});
+  return left;
+}
+
+std::vector<std::string> FillingProcess::accuracy_settings() const {
+  const InjectCase& settings = scene_.settings;
+  std::vector<std::string> lines;
+  if (flow_) {
+    lines.push_back(fmt::format("newton_tolerance {:g}, linear_tolerance {:g}", settings.common.solver.newton_tolerance,
+                                settings.common.solver.linear_tolerance));
+  }
+  if (has_fronts()) {
+    lines.push_back(fmt::format("front cfl {:g}, flow update_distance {:g} elements", settings.front.cfl,
+                                settings.flow.update_distance));
+    lines.push_back(fmt::format("largest ratio of viscosities {:g}", allowed_contrast(settings)));
+  }
+  return lines;
+}
+
+/// From measured constants of one core: a Stokes solve 30 us a node, a substep of the front 2 us a node.
+Forecast FillingProcess::forecast() const {
+  const auto nodes = static_cast<Real>(scene_.mesh.total_nodes());
+  const auto ranks = static_cast<Real>(scene_.comm.size());
+  const Real across =
+      std::pow(static_cast<Real>(std::max<GlobalId>(1, scene_.mesh.total_elements)), 1.0 / scene_.mesh.dim);
+  const bool is_stepping = has_fronts() && scene_.settings.time.increments != 0;
+  Forecast forecast;
+  forecast.increments = is_stepping ? static_cast<GlobalId>(2 * across) : 0;
+  const Real solves = is_stepping ? static_cast<Real>(forecast.increments) : 1;
+  forecast.wall_s = nodes / ranks * (30e-6 * solves + (is_stepping ? 2e-6 * solves / scene_.settings.front.cfl : 0));
+  forecast.memory_bytes = 60e6 * ranks + nodes * (flow_ ? 3000 : 1200);
+  return forecast;
+}
+
+std::vector<std::string> FillingProcess::output_fields() const {
+  std::vector<std::string> names = {"velocity", "pressure", "viscosity", "strain_rate"};
+  for (const std::string& name : fronts_.names()) names.push_back(name);
+  names.emplace_back("fill_time");
+  return names;
+}
+
+/// The front crosses as many elements as the flow may lag behind; and no more comes in than there is room for.
+Real FillingProcess::largest_step() {
+  if (!has_fronts()) return unlimited;
+  const FlowSettings& flow = scene_.settings.flow;
+  Real stride = frozen_stride;
+  if (flow_ && flow.update.kind == FlowUpdate::Kind::every) stride = scene_.settings.front.cfl;
+  if (flow_ && flow.update.kind == FlowUpdate::Kind::automatic) {
+    stride = std::max(flow.update_distance, scene_.settings.front.cfl);
+  }
+  const Real rate = front_->rate();
+  Real dt = rate > 0 ? stride / rate : unlimited;
+  const Real inflow = state_.inflow();
+  if (inflow > 0 && filling_->unfilled() > 0) dt = std::min(dt, filling_->unfilled() / inflow);
+  return dt;
+}
+
+std::optional<std::string> FillingProcess::finished() {
+  return filling_ ? filling_->finished() : std::nullopt;
+}
+
+std::vector<std::string> FillingProcess::history_columns() const {
+  std::vector<std::string> columns = {"fill_fraction", "injected_m3", "volume_error", "flow_updated"};
+  for (const InletSettings& inlet : scene_.settings.inlets) {
+    columns.push_back("pressure_" + inlet.name + "_Pa");
+    columns.push_back("flow_" + inlet.name + "_m3_s");
+  }
+  return columns;
+}
+
+std::vector<HistoryCell> FillingProcess::history_row() {
+  std::vector<HistoryCell> row = {filling_ ? filling_->fill_fraction() : 1, state_.injected,
+                                  filling_ ? filling_->volume_error() : 0,
+                                  flow_ ? (state_.flow_updated || state_.flow_solves == 1 ? 1 : 0) : 0};
+  for (const GateState& gate : state_.gates) {
+    row.push_back(flow_ ? HistoryCell(gate.pressure) : HistoryCell());
+    row.push_back(gate.flow);
+  }
+  return row;
+}
+
+std::string FillingProcess::increment_note() const {
+  if (!has_fronts()) return "flow solved";
+  return fmt::format("filled {:.4f}{} | {} substeps", filling_->fill_fraction(),
+                     state_.flow_updated ? " | flow solved" : "", front_->substeps());
+}
+
+LinearTotals FillingProcess::linear_totals() const {
+  return flow_ ? flow_->linear_totals() : LinearTotals{};
+}
+
+nlohmann::json FillingProcess::known_errors() const {
+  const ReferenceSettings& reference = *scene_.settings.common.reference;
+  const int dim = scene_.mesh.dim;
+  const SolutionErrors errors(scene_.comm, scene_.mesh, scene_.geometry);
+  nlohmann::json json = nlohmann::json::object();
+  const auto put = [&](const std::string& name, const ErrorNorms& norms) {
+    json[name] = norms.absolute;
+    json[name + "_relative"] = norms.relative();
+  };
+  std::vector<std::optional<KnownFunction>> velocity(static_cast<std::size_t>(dim));
+  for (std::size_t c = 0; c < velocity.size(); ++c) {
+    if (reference.velocity[c]) velocity[c] = at_time(*reference.velocity[c], dim, last_time_);
+  }
+  if (std::any_of(velocity.begin(), velocity.end(), [](const auto& known) { return known.has_value(); })) {
+    put("velocity_l2", errors.l2(scene_.fields["velocity"].values(), velocity));
+    put("velocity_h1", errors.h1(scene_.fields["velocity"].values(), velocity));
+  }
+  if (reference.pressure && flow_) {
+    const std::vector<std::optional<KnownFunction>> pressure = {at_time(*reference.pressure, dim, last_time_)};
+    put("pressure_l2", errors.l2(scene_.fields["pressure"].values(), pressure, flow_->pressure_is_free()));
+  }
+  if (reference.level_set && fronts_.size() == 1) {
+    put("level_set_l1", errors.sign_mismatch(fronts_.values(0), at_time(*reference.level_set, dim, last_time_)));
+  }
+  return json;
+}
+
+nlohmann::json FillingProcess::accuracy() {
+  nlohmann::json json = nlohmann::json::object();
+  json["volume_error"] = filling_ ? filling_->volume_error() : 0;
+  if (flow_) json["flow_freezing_error_elements"] = flow_->freezing_error();
+  json["share_below_4_elements_across"] = thin_.below_four;
+  json["share_below_2_elements_across"] = thin_.below_two;
+  if (scene_.settings.common.reference) json["errors"] = known_errors();
+  return json;
+}
+
+std::vector<std::string> FillingProcess::closing_lines() {
+  std::vector<std::string> lines;
+  if (!has_fronts()) return lines;
+  lines.push_back(
+      fmt::format("filled {:.4f} of the cavity; {} flow solves, {} redistances; left through vents {:.4g} m^3",
+                  filling_->fill_fraction(), state_.flow_solves, front_->redistances(), state_.left));
+  if (flow_) {
+    lines.push_back(fmt::format("keeping the flow between solves moved the front by {:.2g} elements in all",
+                                flow_->freezing_error()));
+  }
+  return lines;
+}
+
+nlohmann::json FillingProcess::save_state() const {
+  nlohmann::json gates = nlohmann::json::array();
+  for (const GateState& gate : state_.gates) {
+    gates.push_back({{"kind", static_cast<int>(gate.drive.kind)},
+                     {"value", gate.drive.value},
+                     {"pressure", gate.pressure},
+                     {"flow", gate.flow},
+                     {"switched", gate.switched}});
+  }
+  nlohmann::json state = {{"gates", gates},
+                          {"initial", state_.initial},
+                          {"injected", state_.injected},
+                          {"left", state_.left},
+                          {"filled", state_.filled},
+                          {"travelled", state_.travelled},
+                          {"flow_solves", state_.flow_solves},
+                          {"increments_since_flow", state_.increments_since_flow},
+                          {"seconds_since_flow", state_.seconds_since_flow}};
+  if (flow_) state["flow"] = flow_->save();
+  if (front_) state["front"] = front_->save();
+  return state;
+}
+
+void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
+                             const nlohmann::json& state) {
+  scene_.mesh = std::move(mesh);
+  for (auto& [spec, values] : fields) scene_.fields.declare(scene_.mesh, spec).assign(std::move(values));
+  scene_.rebuild();
+  const nlohmann::json& gates = state.at("gates");
+  for (std::size_t i = 0; i < state_.gates.size(); ++i) {
+    GateState& gate = state_.gates[i];
+    gate.drive = {static_cast<GateDrive::Kind>(gates[i].at("kind").get<int>()), gates[i].at("value")};
+    gate.pressure = gates[i].at("pressure");
+    gate.flow = gates[i].at("flow");
+    gate.switched = gates[i].at("switched");
+  }
+  state_.initial = state.at("initial");
+  state_.injected = state.at("injected");
+  state_.left = state.at("left");
+  state_.filled = state.at("filled");
+  state_.travelled = state.at("travelled");
+  state_.flow_solves = state.at("flow_solves");
+  state_.increments_since_flow = state.at("increments_since_flow");
+  state_.seconds_since_flow = state.at("seconds_since_flow");
+  if (flow_) {
+    flow_->rebuild();
+    flow_->load(state.at("flow"));
+  }
+  if (front_) {
+    front_->rebuild();
+    front_->load(state.at("front"));
+  }
+}
+
+}  // namespace malleus::inject
