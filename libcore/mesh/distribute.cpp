@@ -226,7 +226,22 @@ MeshPiece unpack(const MeshChunk& chunk, const Shipment& received, DistributionR
   return piece;
 }
 
+void broadcast_names(const Communicator& comm, std::vector<std::string>& names) {
+  auto count = static_cast<GlobalId>(names.size());
+  comm.broadcast(std::span(&count, 1));
+  names.resize(static_cast<std::size_t>(count));
+  for (std::string& name : names) comm.broadcast(name);
+}
+
 }  // namespace
+
+void share_head(const Communicator& comm, MeshChunk& chunk) {
+  GlobalId dim = chunk.dim;
+  comm.broadcast(std::span(&dim, 1));
+  chunk.dim = static_cast<int>(dim);
+  broadcast_names(comm, chunk.region_names);
+  broadcast_names(comm, chunk.group_names);
+}
 
 DistributedPiece distribute_mesh(const Communicator& comm, MeshChunk chunk) {
   check_chunk(chunk);

@@ -24,6 +24,9 @@ struct MeshChunk {
   std::vector<std::int32_t> facet_group;
 };
 
+/// Tells all ranks the dimension and names of the chunk that the root alone has filled. Collective.
+void share_head(const Communicator& comm, MeshChunk& chunk);
+
 /// What was found on the way, of the whole mesh: the same on all ranks.
 struct DistributionReport {
   GlobalId repeated_nodes = 0;         ///< node numbers given again at the same place; taken once
