@@ -91,6 +91,12 @@ class Classifier {
     bool operator<(const Rim& other) const { return std::tie(key, face) < std::tie(other.key, other.face); }
   };
 
+  struct Feature {
+    std::uint64_t key;   ///< of the rim
+    std::int32_t group;  ///< of the curve
+    bool locked;         ///< more than one fan of elements ends there
+  };
+
   LocalId find_faces() {
     ListedFacets<D> listed(input_);
     std::map<Kind, std::int32_t> numbers;
@@ -169,9 +175,17 @@ class Classifier {
         const LocalId b = find(rims[first + 1].face);
         parent_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
       } else {
-        features_.emplace_back(rims[first].key, curve == listed.end() ? -1 : curve->second);
+        features_.push_back({rims[first].key, curve == listed.end() ? -1 : curve->second,
+                             count_exterior(std::span(rims).subspan(first, last - first)) > 2});
       }
     }
+  }
+
+  std::size_t count_exterior(std::span<const Rim> rims) const {
+    return static_cast<std::size_t>(std::count_if(rims.begin(), rims.end(), [&](const Rim& rim) {
+      const FaceRef ref = faces_[static_cast<std::size_t>(rim.face)].ref;
+      return mesh_.element(element_of(ref)).neighbour[local_face(ref)] == no_face;
+    }));
   }
 
   bool joins(const Rim& a, const Rim& b) const {
@@ -228,7 +242,7 @@ class Classifier {
       }
     }
     if constexpr (D == 2) {
-      for (const auto& feature : features_) make_corner(static_cast<LocalId>(feature.first));
+      for (const auto& feature : features_) make_corner(static_cast<LocalId>(feature.key));
     } else {
       class_curve_vertices();
     }
@@ -245,8 +259,8 @@ class Classifier {
   void class_curve_vertices() {
     std::vector<std::pair<LocalId, LocalId>> ends;  // vertex, feature
     for (std::size_t n = 0; n < features_.size(); ++n) {
-      ends.emplace_back(static_cast<LocalId>(features_[n].first >> 32), static_cast<LocalId>(n));
-      ends.emplace_back(static_cast<LocalId>(features_[n].first & 0xffffffffU), static_cast<LocalId>(n));
+      ends.emplace_back(static_cast<LocalId>(features_[n].key >> 32), static_cast<LocalId>(n));
+      ends.emplace_back(static_cast<LocalId>(features_[n].key & 0xffffffffU), static_cast<LocalId>(n));
     }
     std::sort(ends.begin(), ends.end());
     for (std::size_t first = 0, last = 0; first < ends.size(); first = last) {
@@ -256,8 +270,8 @@ class Classifier {
       mesh_.vertex(v).entity = -1;
       const auto a = static_cast<std::size_t>(ends[first].second);
       const auto b = static_cast<std::size_t>(ends[last - 1].second);
-      const bool passes = last - first == 2 && features_[a].second == features_[b].second &&
-                          -dot(direction(v, features_[a].first), direction(v, features_[b].first)) >= straight_;
+      const bool passes = last - first == 2 && features_[a].group == features_[b].group &&
+                          -dot(direction(v, features_[a].key), direction(v, features_[b].key)) >= straight_;
       if (!passes) {
         make_corner(v);
       } else {
@@ -272,41 +286,33 @@ class Classifier {
     return normalized(difference<D>(mesh_.point(other), mesh_.point(v)));
   }
 
-  /// A surface vertex where two sheets touch (its faces form more than one fan) must not move or merge.
+  /// A vertex whose elements form more than one face-connected fan holds parts together that touch there alone.
   void find_pinched_vertices() {
-    std::vector<std::pair<LocalId, LocalId>> at;  // vertex, face
-    for (std::size_t f = 0; f < faces_.size(); ++f) {
-      for (const LocalId v : faces_[f].node) {
-        if (mesh_.vertex(v).dimension == D - 1) at.emplace_back(v, static_cast<LocalId>(f));
-      }
+    std::vector<LocalId> count(mesh_.vertices.size(), 0);
+    for (const auto& element : mesh_.elements) {
+      for (const LocalId v : element.node) ++count[static_cast<std::size_t>(v)];
     }
-    std::sort(at.begin(), at.end());
-    for (std::size_t first = 0, last = 0; first < at.size(); first = last) {
-      const LocalId v = at[first].first;
-      while (last < at.size() && at[last].first == v) ++last;
-      if (D == 3 && count_fan(v, std::span(at).subspan(first, last - first)) != last - first) make_corner(v);
+    std::vector<LocalId> seen(mesh_.elements.size(), -1);
+    for (std::size_t v = 0; v < count.size(); ++v) {
+      const auto vertex = static_cast<LocalId>(v);
+      if (count[v] > 0 && mesh_.vertices[v].dimension < D && count_fan(vertex, seen) != count[v]) make_corner(vertex);
     }
   }
 
-  /// Number of faces in the fan about a vertex that begins with its first face.
-  std::size_t count_fan(LocalId v, std::span<const std::pair<LocalId, LocalId>> faces) const {
-    std::vector<char> seen(faces.size(), 0);
-    std::vector<std::size_t> fan = {0};
-    seen[0] = 1;
+  /// Number of elements in the fan about a vertex that begins with the one it knows. seen: [element], last vertex.
+  LocalId count_fan(LocalId v, std::vector<LocalId>& seen) const {
+    std::vector<LocalId> fan = {mesh_.vertex(v).element};
+    seen[static_cast<std::size_t>(fan[0])] = v;
     for (std::size_t n = 0; n < fan.size(); ++n) {
-      const auto& here = faces_[static_cast<std::size_t>(faces[fan[n]].second)].node;
-      for (std::size_t k = 0; k < faces.size(); ++k) {
-        if (seen[k]) continue;
-        const auto& there = faces_[static_cast<std::size_t>(faces[k].second)].node;
-        const bool shares = std::any_of(here.begin(), here.end(), [&](LocalId u) {
-          return u != v && std::find(there.begin(), there.end(), u) != there.end();
-        });
-        if (!shares) continue;
-        seen[k] = 1;
-        fan.push_back(k);
+      const Element<D>& element = mesh_.element(fan[n]);
+      for (std::size_t f = 0; f <= D; ++f) {
+        const FaceRef ref = element.neighbour[f];
+        if (element.node[f] == v || ref == no_face || seen[static_cast<std::size_t>(element_of(ref))] == v) continue;
+        seen[static_cast<std::size_t>(element_of(ref))] = v;
+        fan.push_back(element_of(ref));
       }
     }
-    return fan.size();
+    return static_cast<LocalId>(fan.size());
   }
 
   Point<D> face_normal(const SurfaceFace<D>& face) const {
@@ -357,20 +363,21 @@ class Classifier {
     std::vector<std::int32_t> number(features_.size(), -1);
     for (std::size_t n = 0; n < features_.size(); ++n) {
       auto& curve = number[static_cast<std::size_t>(find(static_cast<LocalId>(n)))];
-      const auto low = static_cast<LocalId>(features_[n].first >> 32);
-      const auto high = static_cast<LocalId>(features_[n].first & 0xffffffffU);
-      const Point<D> tangent = direction(low, features_[n].first);
+      const auto low = static_cast<LocalId>(features_[n].key >> 32);
+      const auto high = static_cast<LocalId>(features_[n].key & 0xffffffffU);
+      const Point<D> tangent = direction(low, features_[n].key);
       if (curve < 0) {
         curve = static_cast<std::int32_t>(mesh_.curves.size());
         mesh_.curves.emplace_back();
-        mesh_.curves.back().group = features_[n].second;
+        mesh_.curves.back().group = features_[n].group;
+        mesh_.curves.back().locked = features_[n].locked;
         std::copy(tangent.begin(), tangent.end(), mesh_.curves.back().tangent.begin());
       }
       Curve& here = mesh_.curves[static_cast<std::size_t>(curve)];
       Real along = 0;
       for (std::size_t i = 0; i < D; ++i) along += tangent[i] * here.tangent[i];
       if (std::abs(along) < 1 - 1e-14) here.straight = false;
-      mesh_.curve_edges.emplace(features_[n].first, curve);
+      mesh_.curve_edges.emplace(features_[n].key, curve);
       for (const LocalId v : {low, high}) {
         if (mesh_.vertex(v).dimension == 1) mesh_.vertex(v).entity = curve;
       }
@@ -383,8 +390,8 @@ class Classifier {
   std::vector<SurfaceFace<D>> faces_;
   std::vector<Kind> kinds_;
   std::vector<LocalId> parent_;
-  std::vector<std::pair<std::uint64_t, std::int32_t>> features_;  ///< rim, group of the curve
-  std::vector<std::pair<LocalId, LocalId>> joined_;               ///< features that continue each other
+  std::vector<Feature> features_;
+  std::vector<std::pair<LocalId, LocalId>> joined_;  ///< features that continue each other
 };
 
 }  // namespace

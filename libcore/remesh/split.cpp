@@ -125,6 +125,7 @@ bool Operators<D, Metric>::split(LocalId e, std::size_t edge) {
   cavity_.find_border();
   const EntityOf entity = edge_entity(a, b);
   if (entity.dimension < D && mesh_.vertex(a).frozen && mesh_.vertex(b).frozen) return false;
+  if (D == 3 && entity.dimension == 1 && mesh_.curves[static_cast<std::size_t>(entity.id)].locked) return false;
   StarOf star{-1, background_.site_on_edge(a, b, entity), a, b};
   if (is_near_ring(star) || cavity_.removes_frozen(star)) return false;
   const Real limit = std::min(limits.split_key, 0.3 * worst);

@@ -83,7 +83,8 @@ struct Patch {
 struct Curve {
   std::int32_t group = -1;
   bool straight = true;
-  Point<3> tangent{};  ///< of a straight curve, unit
+  bool locked = false;  ///< an edge in which parts of the body touch that share no face there: it stays
+  Point<3> tangent{};   ///< of a straight curve, unit
 };
 
 constexpr std::uint64_t edge_key(LocalId a, LocalId b) {
