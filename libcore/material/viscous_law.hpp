@@ -18,7 +18,7 @@ class ViscousLaw {
   /// For each shear rate >= 0: the viscosity eta [Pa.s], and slope = (d eta / d gamma) / gamma [Pa.s^3], which stays
   /// finite at rest. All spans have one length. Local.
   virtual void evaluate(std::span<const Real> shear_rate, std::span<Real> viscosity, std::span<Real> slope) const = 0;
-  /// A lower bound of d ln(tau) / d ln(gamma), tau = eta gamma: m for Norton-Hoff.
+  /// A lower bound of d ln(tau) / d ln(gamma), tau = eta gamma, at most 1: m for Norton-Hoff.
   virtual Real sensitivity() const = 0;
   /// The viscosity does not depend on the shear rate.
   virtual bool is_linear() const { return false; }
@@ -47,7 +47,7 @@ class NortonHoffLaw final : public ViscousLaw {
  public:
   explicit NortonHoffLaw(const NortonHoff& constants) : constants_(constants) {}
   void evaluate(std::span<const Real> shear_rate, std::span<Real> viscosity, std::span<Real> slope) const override;
-  Real sensitivity() const override { return constants_.sensitivity; }
+  Real sensitivity() const override { return std::min<Real>(1, constants_.sensitivity); }
   bool is_linear() const override { return constants_.sensitivity == 1; }
 
  private:
