@@ -21,6 +21,7 @@ struct GateState {
 /// Volumes in m^3 (per metre of depth in plane scenes). "Filled": by any fluid but the one that the cavity held.
 struct FillingState {
   std::vector<GateState> gates;  ///< [inlet]
+  Real time = 0;                 ///< end of the last increment, s
   Real initial = 0;              ///< filled at the start
   Real injected = 0;             ///< through the inlets since
   Real left = 0;                 ///< of the filled, through vents and boundaries

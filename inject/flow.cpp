@@ -77,6 +77,7 @@ Outcome Flow::advance(const Increment& increment) {
     state_.flow_updated = true;
   }
   state_.seconds_since_flow += increment.dt;
+  state_.time = increment.time;
   return Outcome::done();
 }
 
@@ -135,7 +136,7 @@ StickingNodes Flow::sticking_nodes() const {
     const int only = scene_.settings.fluid_index(scene_.settings.walls[part->index].only);
     if (only < 0) continue;
     for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      if (!part->normals.is_on(node)) continue;
+      if (!part->normals->holds(node)) continue;
       bool in_background = true;
       bool is_there = false;
       for (const FluidLevelSet& level_set : fronts_.level_sets()) {
@@ -194,12 +195,11 @@ NewtonOptions Flow::newton_options(const std::vector<GateDrive>& drives) const {
 
 Outcome Flow::solve_with(std::vector<GateDrive> drives, Real time) {
   FlowConditions conditions = make_conditions(scene_, mixture_, drives, sticking_nodes(), time);
-  pressure_is_free_ = conditions.pressure_is_free;
   operator_->set_constraints(std::move(conditions.constraints));
   operator_->set_loads(std::move(conditions.loads));
   operator_->set_gates(conditions.gates);
-  operator_->set_pressure_free(pressure_is_free_);
   operator_->prepare();
+  pressure_is_free_ = operator_->pressure_is_free();
   StokesState unknowns = is_solved_ ? unknowns_ : operator_->start_state();
   operator_->impose_constraints(unknowns);
   const NewtonOutcome newton = NewtonSolver(newton_options(drives)).solve(*operator_, linear_, unknowns);
@@ -219,26 +219,7 @@ Outcome Flow::solve_with(std::vector<GateDrive> drives, Real time) {
   return Outcome::done();
 }
 
-/// Zero mean over the cavity, gates' unknowns alike.
-void Flow::remove_mean_pressure() {
-  const int block = scene_.mesh.dim + 1;
-  Real sum = 0;
-  for (LocalId e = 0; e < scene_.mesh.elements(); ++e) {
-    Real mean = 0;
-    for (const LocalId node : scene_.mesh.nodes_of_element(e)) {
-      mean += unknowns_.nodes[static_cast<std::size_t>(node) * block + scene_.mesh.dim] / block;
-    }
-    sum += scene_.measures[static_cast<std::size_t>(e)] * mean;
-  }
-  const Real mean = scene_.comm.sum(sum) / scene_.cavity;
-  for (std::size_t at = static_cast<std::size_t>(scene_.mesh.dim); at < unknowns_.nodes.size(); at += block) {
-    unknowns_.nodes[at] -= mean;
-  }
-  for (Real& border : unknowns_.borders) border -= mean;
-}
-
 void Flow::publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions) {
-  if (pressure_is_free_) remove_mean_pressure();
   const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
   const std::span<Real> velocity = scene_.fields["velocity"].values();
   const std::span<Real> pressure = scene_.fields["pressure"].values();
@@ -322,6 +303,7 @@ PrescribedFlow::PrescribedFlow(Scene& scene, FillingState& state) : scene_(scene
 
 Outcome PrescribedFlow::advance(const Increment& increment) {
   evaluate(increment.start());
+  state_.time = increment.time;
   return Outcome::done();
 }
 

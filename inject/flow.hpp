@@ -45,7 +45,6 @@ class Flow final : public Component {
   Outcome solve_with(std::vector<GateDrive> drives, Real time);
   bool switch_over(std::vector<GateDrive>& drives);
   void publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions);
-  void remove_mean_pressure();
   void refresh_mixture();
   StickingNodes sticking_nodes() const;
   void note_freezing(std::span<const Real> old_velocity);

@@ -77,181 +77,122 @@ Real asked_flow(const Scene& scene, const BoundaryPart& part, Real time) {
   return scene.comm.sum(flow);
 }
 
-/// Puts all constraints together, in the order of precedence.
-class ConstraintBuilder {
- public:
-  ConstraintBuilder(const Scene& scene, Real time)
-      : scene_(scene), time_(time), constraints_(scene.mesh.dim, scene.mesh.nodes()) {}
-
-  void stick(const BoundaryPart& part, const StickingNodes* only) {
-    for_nodes(part, [&](LocalId node) {
-      if (only == nullptr || (*only)[static_cast<std::size_t>(node)] != 0) {
-        constraints_.fix_velocity(node, at_rest.data());
-      } else {
-        fix_normals(part, node);
-      }
-    });
-  }
-  /// Nothing passes through: slip walls and planes of symmetry.
-  void close(const BoundaryPart& part) {
-    for_nodes(part, [&](LocalId node) { fix_normals(part, node); });
-  }
-  /// No velocity along the surface: gates and vents under a normal traction.
-  void forbid_tangential(const BoundaryPart& part) {
-    for_nodes(part, [&](LocalId node) {
-      for (int k = 1; k < dim(); ++k) constraints_.fix_direction(node, part.normals.direction(node, k), at_rest.data());
-    });
-  }
-  void impose(const BoundaryPart& part) {
-    const BoundarySettings& boundary = scene_.settings.common.boundaries[part.index];
-    if (boundary.type == BoundarySettings::Type::symmetry) return close(part);
-    const ExpressionVector velocity = boundary.imposed_velocity();
-    for_nodes(part, [&](LocalId node) {
-      for (int c = 0; c < dim(); ++c) {
-        const auto& component = velocity[static_cast<std::size_t>(c)];
-        if (!component) continue;
-        std::array<Real, 3> direction = {0, 0, 0};
-        std::array<Real, 3> value = {0, 0, 0};
-        direction[static_cast<std::size_t>(c)] = 1;
-        value[static_cast<std::size_t>(c)] = (*component)(place_of(scene_.mesh, node), time_);
-        constraints_.fix_direction(node, direction.data(), value.data());
-      }
-    });
-  }
-  /// The velocity that the inlet asks for at its nodes that are still free, times the factor with which their discrete
-  /// flux is `flow` (into the cavity). Collective.
-  void feed(const BoundaryPart& part, Real flow) {
-    const InletSettings& inlet = scene_.settings.inlets[part.index];
-    const auto velocity_at = [&](LocalId node) {
-      std::array<Real, 3> inward = {0, 0, 0};
-      for (int c = 0; c < dim(); ++c) inward[static_cast<std::size_t>(c)] = -part.normals.direction(node, 0)[c];
-      return asked_velocity(inlet, place_of(scene_.mesh, node), inward.data(), dim(), time_);
-    };
-    Real discrete = 0;
-    for_nodes(part, [&](LocalId node) {
-      if (node >= scene_.mesh.owned_nodes()) return;
-      auto velocity = velocity_at(node);
-      constraints_.project(node, velocity.data());
-      const Real* normal = part.normals.weighted.data() + static_cast<std::size_t>(node) * dim();
-      for (int c = 0; c < dim(); ++c) discrete -= velocity[static_cast<std::size_t>(c)] * normal[c];
-    });
-    discrete = scene_.comm.sum(discrete);
-    if (flow != 0 && !(discrete * flow > 0)) {
-      throw InputError(fmt::format(
-          "[{}] velocity: no node of the gate can move, all lie on walls: refine the mesh to 2 or more elements across "
-          "the gate",
-          part.section));
-    }
-    const Real factor = flow != 0 ? flow / discrete : 0;
-    for_nodes(part, [&](LocalId node) {
-      auto velocity = velocity_at(node);
-      for (Real& component : velocity) component *= factor;
-      constraints_.fix_velocity(node, velocity.data());
-    });
-  }
-
-  NodeConstraints take() { return std::move(constraints_); }
-
- private:
-  int dim() const { return scene_.mesh.dim; }
-  template <class Action>
-  void for_nodes(const BoundaryPart& part, Action action) {
-    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      if (part.normals.is_on(node)) action(node);
-    }
-  }
-  void fix_normals(const BoundaryPart& part, LocalId node) {
-    for (int k = 0; k < part.normals.count[static_cast<std::size_t>(node)]; ++k) {
-      constraints_.fix_direction(node, part.normals.direction(node, k), at_rest.data());
-    }
-  }
-
-  const Scene& scene_;
-  Real time_;
-  NodeConstraints constraints_;
-};
-
-NodeConstraints make_constraints(const Scene& scene, const std::vector<GateDrive>& drives,
-                                 const StickingNodes& sticking, Real time) {
-  using Kind = BoundaryPart::Kind;
-  ConstraintBuilder builder(scene, time);
-  for (const BoundaryPart* part : scene.parts_of(Kind::wall)) {
-    const WallSettings& wall = scene.settings.walls[part->index];
-    if (wall.condition == WallSettings::Condition::no_slip)
-      builder.stick(*part, wall.only.empty() ? nullptr : &sticking);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::wall)) {
-    if (scene.settings.walls[part->index].condition == WallSettings::Condition::slip) builder.close(*part);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::imposed)) {
-    if (scene.settings.common.boundaries[part->index].type == BoundarySettings::Type::imposed) builder.impose(*part);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::inlet)) {
-    const GateDrive& drive = drives[part->index];
-    if (drive.kind == GateDrive::Kind::velocity) {
-      builder.feed(*part, drive.value);
-    } else {
-      builder.forbid_tangential(*part);
-    }
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::vent)) builder.forbid_tangential(*part);
-  for (const BoundaryPart* part : scene.parts_of(Kind::imposed)) {
-    if (scene.settings.common.boundaries[part->index].type == BoundarySettings::Type::symmetry) builder.impose(*part);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::symmetry)) builder.close(*part);
-  return builder.take();
+[[noreturn]] void refuse_blocked(const BoundaryPart& part) {
+  throw InputError(fmt::format(
+      "[{}]: no node of the gate can move, all lie on walls: refine the mesh to 2 or more elements across the gate",
+      part.section));
 }
 
-/// -p n on every facet of a part.
-void press(const Scene& scene, const BoundaryPart& part, const Expression& pressure, Real time,
-           std::vector<FacetTraction>& tractions) {
-  with_dim(scene.mesh.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (const LocalId f : part.facets) {
-      const Point<D> normal = facet_area_normal<D>(facet_points<D>(scene.mesh, f)).normalized();
-      FacetTraction traction;
-      traction.facet = f;
-      for (int i = 0; i < D; ++i) {
-        const LocalId node = scene.mesh.nodes_of_facet(f)[static_cast<std::size_t>(i)];
-        const Real p = pressure(place_of(scene.mesh, node), time);
-        for (int c = 0; c < D; ++c) traction.traction[static_cast<std::size_t>(i * D + c)] = -p * normal[c];
-      }
-      tractions.push_back(traction);
-    }
-  });
-}
-
-void pull(const Scene& scene, const BoundaryPart& part, Real time, std::vector<FacetTraction>& tractions) {
-  const BoundarySettings& boundary = scene.settings.common.boundaries[part.index];
-  if (boundary.pressure) press(scene, part, *boundary.pressure, time, tractions);
-  if (!boundary.has_traction()) return;
-  const auto force = boundary.imposed_traction();
+/// The velocity that an inlet asks for at its nodes, in the directions that are still free, times the factor with which
+/// their discrete flux is `flow` (into the cavity). Collective.
+void feed(const Scene& scene, const BoundaryPart& part, Real flow, Real time, NodeConstraints& constraints) {
   const int dim = scene.mesh.dim;
-  for (const LocalId f : part.facets) {
-    FacetTraction traction;
-    traction.facet = f;
-    for (int i = 0; i < dim; ++i) {
-      const LocalId node = scene.mesh.nodes_of_facet(f)[static_cast<std::size_t>(i)];
-      for (int c = 0; c < dim; ++c) {
-        traction.traction[static_cast<std::size_t>(i * dim + c)] =
-            force[static_cast<std::size_t>(c)](place_of(scene.mesh, node), time);
-      }
-    }
-    tractions.push_back(traction);
+  const InletSettings& inlet = scene.settings.inlets[part.index];
+  std::vector<Real> velocity(static_cast<std::size_t>(scene.mesh.nodes()) * dim, 0);
+  for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+    if (!part.normals->holds(node)) continue;
+    std::array<Real, 3> inward = {0, 0, 0};
+    for (std::size_t c = 0; c < static_cast<std::size_t>(dim); ++c) inward[c] = -part.normals->normal(node)[c];
+    const auto asked = asked_velocity(inlet, place_of(scene.mesh, node), inward.data(), dim, time);
+    Real* at = velocity.data() + static_cast<std::size_t>(node) * dim;
+    std::copy_n(asked.begin(), dim, at);
+    constraints.project(node, at);
   }
+  const Real discrete = -outflow(scene, part.facets, velocity);
+  if (flow != 0 && !(discrete * flow > 0)) refuse_blocked(part);
+  const Real factor = flow != 0 ? flow / discrete : 0;
+  for (Real& component : velocity) component *= factor;
+  for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+    if (part.normals->holds(node)) {
+      constraints.fix_velocity(node, velocity.data() + static_cast<std::size_t>(node) * dim);
+    }
+  }
+}
+
+/// Whether some node of a part can move along its normal. Collective.
+bool can_move(const Scene& scene, const BoundaryPart& part, const NodeConstraints& constraints) {
+  Real largest = 0;
+  for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+    if (!part.normals->holds(node)) continue;
+    std::array<Real, 3> normal = {0, 0, 0};
+    std::copy_n(part.normals->normal(node).begin(), scene.mesh.dim, normal.begin());
+    constraints.project(node, normal.data());
+    for (const Real component : normal) largest = std::max(largest, std::abs(component));
+  }
+  return scene.comm.max(largest) > 1e-3;
+}
+
+ConditionKind kind_of(const InjectCase& settings, const BoundaryPart& part) {
+  switch (part.kind) {
+    case BoundaryPart::Kind::wall: {
+      const WallSettings& wall = settings.walls[part.index];
+      const bool sticks = wall.condition == WallSettings::Condition::no_slip && wall.only.empty();
+      return sticks ? ConditionKind::no_slip : ConditionKind::symmetry;
+    }
+    case BoundaryPart::Kind::inlet:
+    case BoundaryPart::Kind::vent:
+      return ConditionKind::no_tangential;
+    case BoundaryPart::Kind::symmetry:
+      return ConditionKind::symmetry;
+    case BoundaryPart::Kind::imposed:
+      break;
+  }
+  const bool is_symmetry = settings.common.boundaries[part.index].type == BoundarySettings::Type::symmetry;
+  return is_symmetry ? ConditionKind::symmetry : ConditionKind::velocity;
+}
+
+NodeConstraints impose(const Scene& scene, const std::vector<GateDrive>& drives, const StickingNodes& sticking,
+                       Real time) {
+  constexpr auto is_fed = [](const GateDrive& drive) { return drive.kind == GateDrive::Kind::velocity; };
+  std::vector<BoundaryCondition> conditions;
+  for (const BoundaryPart& part : scene.parts) {
+    if (part.kind == BoundaryPart::Kind::inlet && is_fed(drives[part.index])) continue;
+    BoundaryCondition& condition = conditions.emplace_back();
+    condition.group = part.group;
+    condition.kind = kind_of(scene.settings, part);
+    if (condition.kind == ConditionKind::velocity) {
+      condition.velocity = scene.settings.common.boundaries[part.index].imposed_velocity();
+    }
+  }
+  NodeConstraints constraints = make_constraints(scene.comm, scene.mesh, scene.geometry, conditions, time);
+  for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+    if (sticking[static_cast<std::size_t>(node)] != 0) constraints.fix_velocity(node, at_rest.data());
+  }
+  for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::inlet)) {
+    const GateDrive& drive = drives[part->index];
+    if (is_fed(drive)) feed(scene, *part, drive.value, time, constraints);
+    if (drive.kind == GateDrive::Kind::flow_rate && drive.value != 0 && !can_move(scene, *part, constraints)) {
+      refuse_blocked(*part);
+    }
+  }
+  return constraints;
+}
+
+std::vector<FacetTraction> press(const Scene& scene, const std::vector<GateDrive>& drives, Real time) {
+  std::vector<BoundaryLoad> loads;
+  for (const BoundaryPart& part : scene.parts) {
+    BoundaryLoad load;
+    load.group = part.group;
+    if (part.kind == BoundaryPart::Kind::vent) load.pressure = scene.settings.vents[part.index].pressure;
+    if (part.kind == BoundaryPart::Kind::inlet && drives[part.index].kind == GateDrive::Kind::pressure) {
+      load.pressure = Expression(drives[part.index].value);
+    }
+    if (part.kind == BoundaryPart::Kind::imposed) {
+      const BoundarySettings& boundary = scene.settings.common.boundaries[part.index];
+      load.pressure = boundary.pressure;
+      load.traction = boundary.imposed_traction();
+      if (!boundary.has_traction() && !boundary.pressure) continue;
+    } else if (!load.pressure) {
+      continue;
+    }
+    loads.push_back(std::move(load));
+  }
+  return make_tractions(scene.comm, scene.mesh, loads, time);
 }
 
 StokesLoads make_loads(const Scene& scene, const Mixture& mixture, const std::vector<GateDrive>& drives, Real time) {
-  using Kind = BoundaryPart::Kind;
   StokesLoads loads;
-  for (const BoundaryPart* part : scene.parts_of(Kind::inlet)) {
-    const GateDrive& drive = drives[part->index];
-    if (drive.kind == GateDrive::Kind::pressure) press(scene, *part, Expression(drive.value), time, loads.tractions);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::vent)) {
-    press(scene, *part, scene.settings.vents[part->index].pressure, time, loads.tractions);
-  }
-  for (const BoundaryPart* part : scene.parts_of(Kind::imposed)) pull(scene, *part, time, loads.tractions);
+  loads.tractions = press(scene, drives, time);
   const auto dim = static_cast<std::size_t>(scene.mesh.dim);
   if (const auto& gravity = scene.settings.common.gravity) {
     loads.element_force.resize(static_cast<std::size_t>(scene.mesh.elements()) * dim);
@@ -324,7 +265,7 @@ std::vector<char> sticking_walls(const Scene& scene) {
   for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::wall)) {
     if (scene.settings.walls[part->index].condition != WallSettings::Condition::no_slip) continue;
     for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
-      if (part->normals.is_on(node)) sticks[static_cast<std::size_t>(node)] = 1;
+      if (part->normals->holds(node)) sticks[static_cast<std::size_t>(node)] = 1;
     }
   }
   return sticks;
@@ -352,7 +293,7 @@ std::vector<GateDrive> asked_drives(const Scene& scene, Real time) {
 FlowConditions make_conditions(const Scene& scene, const Mixture& mixture, const std::vector<GateDrive>& drives,
                                const StickingNodes& sticking, Real time) {
   FlowConditions conditions;
-  conditions.constraints = make_constraints(scene, drives, sticking, time);
+  conditions.constraints = impose(scene, drives, sticking, time);
   conditions.loads = make_loads(scene, mixture, drives, time);
   for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::inlet)) {
     const GateDrive& drive = drives[part->index];
@@ -360,10 +301,7 @@ FlowConditions make_conditions(const Scene& scene, const Mixture& mixture, const
     conditions.gates.push_back({part->facets, -drive.value});
     conditions.gate_inlets.push_back(part->index);
   }
-  if (!has_opening(scene, drives)) {
-    conditions.pressure_is_free = true;
-    refuse_sealed(scene, drives, conditions.constraints);
-  }
+  if (!has_opening(scene, drives)) refuse_sealed(scene, drives, conditions.constraints);
   return conditions;
 }
 

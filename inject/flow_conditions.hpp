@@ -29,7 +29,6 @@ struct FlowConditions {
   StokesLoads loads;
   std::vector<FluxGate> gates;
   std::vector<std::size_t> gate_inlets;  ///< inlet of each gate
-  bool pressure_is_free = false;
 };
 
 /// Wall over inlet, inlet over symmetry. Velocity inlets are rescaled so that the discrete flux is drive.value.

@@ -73,7 +73,7 @@ std::vector<char> Front::wetted_nodes() const {
   std::vector<char> wetted = sticking_walls(scene_);
   for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
     for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      if (part->normals.is_on(node)) wetted[static_cast<std::size_t>(node)] = 0;
+      if (part->normals->holds(node)) wetted[static_cast<std::size_t>(node)] = 0;
     }
   }
   return wetted;
@@ -195,7 +195,7 @@ ImposedLevelSet Front::imposed(std::size_t front, Real dt) const {
     const bool is_ours = scene_.settings.fluid_index(scene_.settings.inlets[part->index].fluid) == fronts_.fluid(front);
     const Real way = flow / part->area * dt;
     for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      if (!part->normals.is_on(node)) continue;
+      if (!part->normals->holds(node)) continue;
       const Real value = level_set[static_cast<std::size_t>(node)];
       impose(node, is_ours ? std::max(value, 0.0) + way : std::min(value, 0.0) - way);
     }
@@ -203,10 +203,10 @@ ImposedLevelSet Front::imposed(std::size_t front, Real dt) const {
   for (const BoundaryPart& part : scene_.parts) {
     if (part.kind != BoundaryPart::Kind::vent && part.kind != BoundaryPart::Kind::imposed) continue;
     for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      if (!part.normals.is_on(node)) continue;
+      if (!part.normals->holds(node)) continue;
       Real inward = 0;
       for (std::size_t c = 0; c < dim; ++c) {
-        inward -= velocity[static_cast<std::size_t>(node) * dim + c] * part.normals.direction(node, 0)[c];
+        inward -= velocity[static_cast<std::size_t>(node) * dim + c] * part.normals->normal(node)[c];
       }
       if (!(inward > 0)) continue;
       const Real value = level_set[static_cast<std::size_t>(node)];

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/log.hpp"
-#include "fem/solution_errors.hpp"
+#include "fem/error_norms.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -18,12 +18,6 @@ constexpr Real frozen_stride = 4;
 /// Away from power-law scenes the shear-rate cut-off plays no part.
 Real cut_off(const Scene& scene) {
   return scene.settings.common.solver.cutoff_strain_rate * typical_shear_rate(scene);
-}
-
-KnownFunction at_time(const Expression& formula, int dim, Real time) {
-  return [&formula, dim, time](std::span<const Real> coordinates, std::span<Real> values) {
-    formula.evaluate(coordinates, dim, time, values);
-  };
 }
 
 }  // namespace
@@ -139,7 +133,19 @@ std::vector<std::string> FillingProcess::history_columns() const {
     columns.push_back("pressure_" + inlet.name + "_Pa");
     columns.push_back("flow_" + inlet.name + "_m3_s");
   }
+  for (const std::string& name : error_columns()) columns.push_back(name);
   return columns;
+}
+
+/// With [reference] at = every: the absolute errors, as summary.json names them.
+std::vector<std::string> FillingProcess::error_columns() const {
+  const auto& reference = scene_.settings.common.reference;
+  if (!reference || reference->at != ReferenceTime::every) return {};
+  std::vector<std::string> names;
+  if (reference->velocity[0]) names.insert(names.end(), {"velocity_l2", "velocity_h1"});
+  if (reference->pressure && flow_) names.emplace_back("pressure_l2");
+  if (reference->level_set && fronts_.size() == 1) names.emplace_back("level_set_l1");
+  return names;
 }
 
 std::vector<HistoryCell> FillingProcess::history_row() {
@@ -150,6 +156,11 @@ std::vector<HistoryCell> FillingProcess::history_row() {
     row.push_back(flow_ ? HistoryCell(gate.pressure) : HistoryCell());
     row.push_back(gate.flow);
   }
+  const std::vector<std::string> errors = error_columns();
+  if (errors.empty()) return row;
+  const nlohmann::json known = known_errors();
+  for (const std::string& name : errors)
+    row.push_back(known.contains(name) ? HistoryCell(known.at(name)) : HistoryCell());
   return row;
 }
 
@@ -163,30 +174,28 @@ LinearTotals FillingProcess::linear_totals() const {
   return flow_ ? flow_->linear_totals() : LinearTotals{};
 }
 
-nlohmann::json FillingProcess::known_errors() const {
+nlohmann::json FillingProcess::known_errors() {
   const ReferenceSettings& reference = *scene_.settings.common.reference;
-  const int dim = scene_.mesh.dim;
-  const SolutionErrors errors(scene_.comm, scene_.mesh, scene_.geometry);
+  DiscreteFields fields;
+  fields.velocity = scene_.fields["velocity"].values();
+  if (flow_) {
+    fields.pressure = scene_.fields["pressure"].values();
+    fields.pressure_is_free = flow_->pressure_is_free();
+  }
+  if (fronts_.size() == 1) fields.level_set = fronts_.values(0);
+  const SolutionErrors errors =
+      solution_errors(scene_.comm, scene_.mesh, scene_.geometry,
+                      {reference.velocity, reference.pressure, reference.level_set}, fields, {}, state_.time);
   nlohmann::json json = nlohmann::json::object();
-  const auto put = [&](const std::string& name, const ErrorNorms& norms) {
-    json[name] = norms.absolute;
-    json[name + "_relative"] = norms.relative();
+  const auto put = [&](const std::string& name, const std::optional<ErrorNorm>& norm) {
+    if (!norm) return;
+    json[name] = norm->absolute;
+    json[name + "_relative"] = norm->known > 0 ? nlohmann::json(norm->relative()) : nlohmann::json();
   };
-  std::vector<std::optional<KnownFunction>> velocity(static_cast<std::size_t>(dim));
-  for (std::size_t c = 0; c < velocity.size(); ++c) {
-    if (reference.velocity[c]) velocity[c] = at_time(*reference.velocity[c], dim, last_time_);
-  }
-  if (std::any_of(velocity.begin(), velocity.end(), [](const auto& known) { return known.has_value(); })) {
-    put("velocity_l2", errors.l2(scene_.fields["velocity"].values(), velocity));
-    put("velocity_h1", errors.h1(scene_.fields["velocity"].values(), velocity));
-  }
-  if (reference.pressure && flow_) {
-    const std::vector<std::optional<KnownFunction>> pressure = {at_time(*reference.pressure, dim, last_time_)};
-    put("pressure_l2", errors.l2(scene_.fields["pressure"].values(), pressure, flow_->pressure_is_free()));
-  }
-  if (reference.level_set && fronts_.size() == 1) {
-    put("level_set_l1", errors.sign_mismatch(fronts_.values(0), at_time(*reference.level_set, dim, last_time_)));
-  }
+  put("velocity_l2", errors.velocity_l2);
+  put("velocity_h1", errors.velocity_h1);
+  put("pressure_l2", errors.pressure_l2);
+  put("level_set_l1", errors.level_set_l1);
   return json;
 }
 
@@ -223,6 +232,7 @@ nlohmann::json FillingProcess::save_state() const {
                      {"switched", gate.switched}});
   }
   nlohmann::json state = {{"gates", gates},
+                          {"time", state_.time},
                           {"initial", state_.initial},
                           {"injected", state_.injected},
                           {"left", state_.left},
@@ -249,6 +259,7 @@ void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::
     gate.flow = gates[i].at("flow");
     gate.switched = gates[i].at("switched");
   }
+  state_.time = state.at("time");
   state_.initial = state.at("initial");
   state_.injected = state.at("injected");
   state_.left = state.at("left");

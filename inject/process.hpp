@@ -48,7 +48,8 @@ class FillingProcess final : public Process {
   Probes* probes() override { return probes_ ? probes_.get() : nullptr; }
 
  private:
-  nlohmann::json known_errors() const;
+  nlohmann::json known_errors();
+  std::vector<std::string> error_columns() const;
 
   Scene scene_;
   FrontSet fronts_;
@@ -61,7 +62,6 @@ class FillingProcess final : public Process {
   std::unique_ptr<Probes> probes_;
   std::vector<Component*> order_;
   ThinSections thin_;
-  Real last_time_ = 0;
 };
 
 /// The thickest fluid's viscosity over the thinnest that is modelled as it is given.

@@ -108,18 +108,10 @@ void Scene::rebuild() {
   for (BoundaryPart& part : parts) part.group = mesh.find_group(group_of(settings, part));
   const std::vector<int> part_of_group = parts_of_groups(mesh, parts);
   if (!settings.flow.is_prescribed()) refuse_unnamed(comm, mesh, part_of_group);
-  for (LocalId f = 0; f < mesh.exterior_facets; ++f) {
-    const std::int32_t group = mesh.facet_group[static_cast<std::size_t>(f)];
-    const int part = group < 0 ? -1 : part_of_group[static_cast<std::size_t>(group)];
-    if (part >= 0) parts[static_cast<std::size_t>(part)].facets.push_back(f);
-  }
   for (BoundaryPart& part : parts) {
-    part.normals = surface_normals(mesh, part.facets, geometry);
-    Real area = 0;
-    with_dim(mesh.dim, [&](auto d) {
-      for (const LocalId f : part.facets) area += facet_integrals<decltype(d)::value>(mesh, f, geometry).area();
-    });
-    part.area = comm.sum(area);
+    part.facets = facets_of_group(mesh, part.group);
+    part.normals.emplace(mesh, part.group, geometry);
+    part.area = boundary_area(comm, mesh, geometry, part.facets);
     if (part.area > 0) continue;
     throw InputError(fmt::format("[{}] group: no facet of '{}' lies on the boundary of the mesh", part.section,
                                  group_of(settings, part)));
@@ -135,19 +127,7 @@ std::vector<const BoundaryPart*> Scene::parts_of(BoundaryPart::Kind kind) const 
 }
 
 Real outflow(const Scene& scene, std::span<const LocalId> facets, std::span<const Real> velocity) {
-  Real flow = 0;
-  with_dim(scene.mesh.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (const LocalId f : facets) {
-      const FacetIntegrals<D> integrals = facet_integrals<D>(scene.mesh, f, scene.geometry);
-      const auto shares = integrals.shares();
-      for (int i = 0; i < D; ++i) {
-        const auto node = static_cast<std::size_t>(scene.mesh.nodes_of_facet(f)[static_cast<std::size_t>(i)]);
-        flow += shares[i] * integrals.normal.dot(Eigen::Map<const Point<D>>(velocity.data() + node * D));
-      }
-    }
-  });
-  return scene.comm.sum(flow);
+  return boundary_flux(scene.comm, scene.mesh, scene.geometry, facets, velocity, scene.mesh.dim);
 }
 
 Real surface_mean(const Scene& scene, const BoundaryPart& part, std::span<const Real> field) {

@@ -2,10 +2,11 @@
 
 /// What all parts of the filling process share: case, mesh, fields, and which part of the boundary is what.
 
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "fem/surface_normals.hpp"
+#include "fem/boundary_conditions.hpp"
 #include "field/field.hpp"
 #include "inject/sections.hpp"
 #include "mesh/node_graph.hpp"
@@ -22,7 +23,7 @@ struct BoundaryPart {
   int group = -1;
   std::vector<LocalId> facets;  ///< of this rank
   Real area = 0;                ///< m^2 over all ranks (m per metre of depth; whole revolution)
-  SurfaceNormals normals;
+  std::optional<GroupNormals> normals;
 };
 
 /// Built once a mesh; everything but the fields is renewed by rebuild() when the mesh was replaced.
