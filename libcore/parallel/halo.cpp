@@ -15,6 +15,8 @@ template <class T>
 MPI_Datatype mpi_type() {
   if constexpr (std::is_same_v<T, Real>) {
     return MPI_DOUBLE;
+  } else if constexpr (std::is_same_v<T, float>) {
+    return MPI_FLOAT;
   } else {
     return MPI_INT64_T;
   }
@@ -114,14 +116,14 @@ void Halo::update(std::span<T> values, int components) const {
   }
 }
 
-template <class Combine>
-void Halo::combine(std::span<Real> values, int components, Combine apply) const {
+template <class T, class Combine>
+void Halo::combine(std::span<T> values, int components, Combine apply) const {
   check(values.size() == static_cast<std::size_t>(owned_ + copies_) * components, "halo values have the right size");
-  const auto incoming = swap_buffers<Real>(comm_, partners_, components, values, receives_of, sends_of);
+  const auto incoming = swap_buffers<T>(comm_, partners_, components, values, receives_of, sends_of);
   for (std::size_t i = 0; i < partners_.size(); ++i) {
-    const Real* source = incoming[i].data();
+    const T* source = incoming[i].data();
     for (const LocalId entity : partners_[i].sends) {
-      Real* target = values.data() + static_cast<std::size_t>(entity) * components;
+      T* target = values.data() + static_cast<std::size_t>(entity) * components;
       for (int c = 0; c < components; ++c) target[c] = apply(target[c], *source++);
     }
   }
@@ -130,12 +132,18 @@ void Halo::combine(std::span<Real> values, int components, Combine apply) const 
 void Halo::update_copies(std::span<Real> values, int components) const {
   update(values, components);
 }
+void Halo::update_copies(std::span<float> values, int components) const {
+  update(values, components);
+}
 void Halo::update_copies(std::span<GlobalId> values, int components) const {
   update(values, components);
 }
 
 void Halo::add_to_owners(std::span<Real> values, int components) const {
   combine(values, components, [](Real a, Real b) { return a + b; });
+}
+void Halo::add_to_owners(std::span<float> values, int components) const {
+  combine(values, components, [](float a, float b) { return a + b; });
 }
 void Halo::max_to_owners(std::span<Real> values, int components) const {
   combine(values, components, [](Real a, Real b) { return std::max(a, b); });

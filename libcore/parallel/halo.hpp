@@ -37,10 +37,12 @@ class Halo {
 
   /// Owner's values -> copies. values: [owned + copies][components]. Collective among neighbours.
   void update_copies(std::span<Real> values, int components) const;
+  void update_copies(std::span<float> values, int components) const;
   void update_copies(std::span<GlobalId> values, int components) const;
   /// Values of the copies are added to their owner's; the copies keep theirs. In rank order, so the sums repeat
   /// bit for bit. Collective among neighbours.
   void add_to_owners(std::span<Real> values, int components) const;
+  void add_to_owners(std::span<float> values, int components) const;
   /// The largest (smallest) of the owner's value and its copies' goes to the owner. Collective among neighbours.
   void max_to_owners(std::span<Real> values, int components) const;
   void min_to_owners(std::span<Real> values, int components) const;
@@ -60,8 +62,8 @@ class Halo {
  private:
   template <class T>
   void update(std::span<T> values, int components) const;
-  template <class Combine>
-  void combine(std::span<Real> values, int components, Combine apply) const;
+  template <class T, class Combine>
+  void combine(std::span<T> values, int components, Combine apply) const;
 
   MPI_Comm comm_ = MPI_COMM_NULL;  ///< not owned: that of the Communicator, which must outlive the plan
   LocalId owned_ = 0;

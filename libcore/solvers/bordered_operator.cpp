@@ -127,4 +127,15 @@ void BorderedOperator::add_borders(std::span<const Real> q, Real factor, Real* y
   }
 }
 
+void BorderedOperator::subtract_borders(std::span<const Real> q, Real* velocities) const {
+  const auto dim = static_cast<std::size_t>(system_.mesh->dim);
+  for (std::size_t j = 0; j < q.size(); ++j) {
+    const BorderColumn& column = system_.borders[j];
+    for (std::size_t k = 0; k < column.nodes.size(); ++k) {
+      Real* v = velocities + static_cast<std::size_t>(column.nodes[k]) * dim;
+      for (std::size_t d = 0; d < dim; ++d) v[d] -= column.values[k * dim + d] * q[j];
+    }
+  }
+}
+
 }  // namespace malleus

@@ -2,16 +2,10 @@
 
 /// The operator [K g; g^T d] of a LinearSystem for PETSc, and its vectors.
 
-#include <petscksp.h>
-
 #include "fem/linear_system.hpp"
-#include "parallel/petsc.hpp"
+#include "solvers/petsc_objects.hpp"
 
 namespace malleus {
-
-using PetscMatrix = PetscOwner<Mat, MatDestroy>;
-using PetscVector = PetscOwner<Vec, VecDestroy>;
-using PetscNullSpace = PetscOwner<MatNullSpace, MatNullSpaceDestroy>;
 
 /// Vectors hold the owned nodes in blocks of dim+1, and on the root the border unknowns after them. The system must
 /// outlive the operator.
@@ -34,7 +28,8 @@ class BorderedOperator {
   void multiply(const Real* x, Real* y) const;             ///< y = [K g; g^T d] x; collective
   std::vector<Real> border_values(const Real* x) const;    ///< on all ranks; collective
   std::vector<Real> border_products(const Real* x) const;  ///< g_j^T x_v of each column, on all ranks; collective
-  void add_borders(std::span<const Real> q, Real factor, Real* y) const;  ///< y_v += factor sum_j g_j q_j; local
+  void add_borders(std::span<const Real> q, Real factor, Real* y) const;   ///< y_v += factor sum_j g_j q_j; local
+  void subtract_borders(std::span<const Real> q, Real* velocities) const;  ///< [owned node][dim], v -= g q; local
 
  private:
   void make_shell();

@@ -4,9 +4,9 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "fem/linear_system.hpp"
+#include "solvers/preconditioner_settings.hpp"
 
 namespace malleus {
 
@@ -22,8 +22,9 @@ enum class LinearMethod {
 
 struct LinearSolverOptions {
   LinearMethod method = LinearMethod::block_triangular;
-  int restart = 40;               ///< Krylov vectors between restarts, >= 2
-  int max_iterations = 300;       ///< of each step of the fallback chain
+  PreconditionerSettings preconditioner;
+  int restart = 40;               ///< Krylov vectors between restarts, >= 2; 150 in the fallbacks
+  int max_iterations = 300;       ///< of each step of the fallback chain; 20 times as many for the baselines
   bool reuse_setup = true;        ///< keep a hierarchy for later systems until the iterations grow
   bool fall_back = true;          ///< try stronger settings where a solve fails
   LocalId direct_limit = 50'000;  ///< nodes over all ranks up to which the chain ends in MUMPS
@@ -31,20 +32,24 @@ struct LinearSolverOptions {
 
 /// How a solve went; the same on all ranks.
 struct LinearOutcome {
-  bool converged = false;             ///< true residual ||b - K x|| / ||b|| <= the tolerance asked for
-  int iterations = 0;                 ///< of all steps of the chain
-  Real residual = 1;                  ///< ||b - K x|| / ||b||, computed from its definition after the solve
-  bool setup_built = false;           ///< false: an earlier hierarchy was used
-  int fallbacks = 0;                  ///< steps of the chain beyond the first
-  std::string reason;                 ///< why it failed; empty where converged
-  std::vector<std::string> messages;  ///< for the log: choices made, fallbacks taken
+  bool converged = false;    ///< true residual ||b - K x|| / ||b|| <= the tolerance asked for
+  int iterations = 0;        ///< of all steps of the chain
+  Real residual = 1;         ///< ||b - K x|| / ||b||, computed from its definition after the solve
+  bool setup_built = false;  ///< false: an earlier hierarchy was used
+  int fallbacks = 0;         ///< steps of the chain beyond the first
+  std::string reason;        ///< why it failed; empty where converged
   Real setup_seconds = 0;
   Real solve_seconds = 0;
 };
 
-/// Keeps the set-up (hierarchy, factors, Krylov vectors) between the systems of a run. Options of the PETSc
-/// database act on it without a prefix (-ksp_view, -ksp_monitor_true_residual, -ksp_type, ...); our preconditioner is
-/// registered with PETSc as "malleus_stokes".
+/// Keeps the hierarchy between the systems of a run, and what the fallback chain learned. Options of the PETSc
+/// database act on it without a prefix (-ksp_view, -ksp_monitor_true_residual, -ksp_type, -pc_type, ...). Our
+/// preconditioner is registered with PETSc as "malleus_stokes"; its own options are
+///   -malleus_method block_triangular | gamg | gmres_ilu | conjugate_residual | direct
+///   -malleus_modes automatic | translations | rigid
+///   -malleus_precision automatic | single | double
+///   -malleus_threshold <strong couplings, 0.15>  -malleus_chebyshev_steps <3>  -malleus_restart <40>
+/// The choices made are said in the log's details, fallbacks as warnings.
 class StokesLinearSolver {
  public:
   explicit StokesLinearSolver(LinearSolverOptions options = {});

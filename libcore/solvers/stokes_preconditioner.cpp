@@ -1,0 +1,176 @@
+#include "solvers/stokes_preconditioner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "solvers/bordered_preconditioner.hpp"
+#include "solvers/gamg_velocity.hpp"
+
+namespace malleus {
+namespace {
+
+constexpr Real rigid_contrast = 1e2;
+constexpr Real double_contrast = 1e6;
+
+std::size_t index(LocalId i) {
+  return static_cast<std::size_t>(i);
+}
+
+Real viscosity_contrast(const LinearSystem& system) {
+  Real low = std::numeric_limits<Real>::max();
+  Real high = 0;
+  for (const Real viscosity : system.element_viscosity) {
+    if (viscosity <= 0) continue;
+    low = std::min(low, viscosity);
+    high = std::max(high, viscosity);
+  }
+  low = system.comm->min(low);
+  high = system.comm->max(high);
+  return high > 0 ? high / low : 1.0;
+}
+
+/// The finest level of the velocity block; takes the values and copies layout and graph.
+MultigridLevel finest_level(const LinearSystem& system, StokesBlocks& blocks) {
+  MultigridLevel level;
+  const Mesh& mesh = *system.mesh;
+  level.layout = blocks.layout;
+  level.graph = blocks.graph;
+  level.values = std::move(blocks.velocity);
+  level.points.assign(mesh.coordinates.begin(),
+                      mesh.coordinates.begin() + static_cast<std::ptrdiff_t>(mesh.owned_nodes()) * mesh.dim);
+  level.left_out.resize(index(mesh.owned_nodes()));
+  for (LocalId node = 0; node < mesh.owned_nodes(); ++node) {
+    level.left_out[index(node)] = system.constraints->fixed_directions(node) == mesh.dim;
+  }
+  return level;
+}
+
+}  // namespace
+
+PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSystem& system) {
+  const Real contrast = viscosity_contrast(system);
+  if (settings.modes == CoarseModes::automatic) {
+    settings.modes = contrast > rigid_contrast ? CoarseModes::rigid : CoarseModes::translations;
+  }
+  if (settings.precision == CyclePrecision::automatic) {
+    settings.precision =
+        contrast > double_contrast ? CyclePrecision::double_precision : CyclePrecision::single_precision;
+  }
+  return settings;
+}
+
+StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const PreconditionerSettings& settings)
+    : settings_(settings), operator_(&op), blocks_(extract_blocks(op.system())) {
+  const LinearSystem& system = op.system();
+  pressure_ = std::make_unique<PressureBlock>(system, blocks_, settings_.chebyshev_steps);
+  blocks_.pressure = {};
+  pressure_residual_.assign(index(blocks_.graph.rows()), 0.0F);
+  pressure_correction_.assign(index(blocks_.layout.size()), 0.0F);
+  velocity_residual_.assign(index(blocks_.graph.rows()) * index(system.mesh->dim), 0.0);
+  velocity_correction_ = velocity_residual_;
+  MultigridLevel finest = finest_level(system, blocks_);
+  if (settings_.velocity == VelocityMethod::gamg) {
+    velocity_ = make_gamg_velocity(*system.comm, finest, *system.constraints);
+  } else {
+    MultigridSettings multigrid;
+    multigrid.rigid_modes = settings_.modes == CoarseModes::rigid;
+    multigrid.double_precision = settings_.precision == CyclePrecision::double_precision;
+    multigrid.threshold = settings_.threshold;
+    velocity_ = make_velocity_multigrid(*system.comm, std::move(finest), *system.constraints, multigrid);
+  }
+  make_border_block();
+}
+
+void StokesPreconditioner::make_border_block() {
+  const int borders = operator_->borders();
+  const auto dim = index(operator_->system().mesh->dim);
+  Eigen::MatrixXd schur(borders, borders);
+  std::vector<Real> column(operator_->node_unknowns());
+  for (int j = 0; j < borders; ++j) {
+    std::vector<Real> unit(static_cast<std::size_t>(borders), 0.0);
+    unit[static_cast<std::size_t>(j)] = 1;
+    std::fill(column.begin(), column.end(), 0.0);
+    operator_->add_borders(unit, 1.0, column.data());
+    for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
+      for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] = column[node * (dim + 1) + d];
+    }
+    solve_velocity(velocity_residual_, column.data());
+    const std::vector<Real> products = operator_->border_products(column.data());
+    for (int i = 0; i < borders; ++i) schur(i, j) = -products[static_cast<std::size_t>(i)];
+    schur(j, j) += operator_->system().borders[static_cast<std::size_t>(j)].diagonal;
+  }
+  border_inverse_ = symmetric_pseudo_inverse(schur, settings_.positive);
+}
+
+/// correction: [owned node][dim+1], of which the velocities are written.
+void StokesPreconditioner::solve_velocity(std::vector<Real>& right_side, Real* correction) {
+  velocity_->apply(right_side.data(), velocity_correction_.data());
+  const auto dim = index(operator_->system().mesh->dim);
+  for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
+    for (std::size_t d = 0; d < dim; ++d) {
+      correction[node * (dim + 1) + d] = blocks_.scaling * velocity_correction_[node * dim + d];
+    }
+  }
+}
+
+void StokesPreconditioner::apply(const Real* residual, Real* correction) {
+  const auto dim = index(operator_->system().mesh->dim);
+  const auto rows = index(blocks_.graph.rows());
+  const Real sign = settings_.positive ? 1.0 : -1.0;
+  for (std::size_t node = 0; node < rows; ++node) {
+    pressure_residual_[node] = static_cast<float>(sign * residual[node * (dim + 1) + dim]);
+    for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] = residual[node * (dim + 1) + d];
+  }
+  pressure_->apply(pressure_residual_.data(), pressure_correction_);
+  for (std::size_t node = 0; node < rows; ++node) {
+    correction[node * (dim + 1) + dim] = blocks_.scaling * static_cast<Real>(pressure_correction_[node]);
+    for (LocalId k = settings_.positive ? 0 : blocks_.graph.offsets[node];
+         !settings_.positive && k < blocks_.graph.offsets[node + 1]; ++k) {
+      const float p = pressure_correction_[index(blocks_.graph.columns[index(k)])];
+      const float* gradient = blocks_.gradient.at(k);
+      for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] -= static_cast<Real>(gradient[d] * p);
+    }
+  }
+  const std::vector<Real> rest = operator_->border_values(residual);
+  if (!rest.empty()) {
+    const Eigen::VectorXd q = border_inverse_ * Eigen::Map<const Eigen::VectorXd>(rest.data(), border_inverse_.rows());
+    if (operator_->system().comm->is_root()) std::copy(q.begin(), q.end(), correction + operator_->node_unknowns());
+    if (!settings_.positive) {
+      operator_->subtract_borders({q.data(), static_cast<std::size_t>(q.size())}, velocity_residual_.data());
+    }
+  }
+  solve_velocity(velocity_residual_, correction);
+}
+
+std::string StokesPreconditioner::summary() const {
+  if (settings_.velocity == VelocityMethod::gamg) {
+    return fmt::format("GAMG with rigid-body modes, {} levels, complexity {:.2f}", velocity_->levels().size(),
+                       velocity_->operator_complexity());
+  }
+  return fmt::format("multigrid with {} in {} precision, {} levels, complexity {:.2f}",
+                     settings_.modes == CoarseModes::rigid ? "rigid-body modes" : "translations",
+                     settings_.precision == CyclePrecision::double_precision ? "double" : "single",
+                     velocity_->levels().size(), velocity_->operator_complexity());
+}
+
+std::string StokesPreconditioner::table() const {
+  std::string text = summary() + "\n";
+  for (const MultigridLevelSummary& level : velocity_->levels()) {
+    text += fmt::format("  {:>12} nodes of {} unknowns, {:5.1f} entries a row, on {} ranks\n", level.nodes, level.block,
+                        level.entries_per_row, level.active_ranks);
+  }
+  text += fmt::format("pressure: {} Chebyshev steps on [{:.2f}, {:.2f}]\n", settings_.chebyshev_steps,
+                      pressure_->bounds().low, pressure_->bounds().high);
+  return text;
+}
+
+std::size_t StokesPreconditioner::bytes() const {
+  return velocity_->bytes() + pressure_->bytes() + sizeof(float) * blocks_.gradient.values.size() +
+         sizeof(LocalId) * blocks_.graph.columns.size() +
+         sizeof(Real) * (velocity_residual_.size() + velocity_correction_.size());
+}
+
+}  // namespace malleus

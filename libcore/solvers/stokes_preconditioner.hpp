@@ -1,0 +1,59 @@
+#pragma once
+
+/// The block-triangular preconditioner of Stokes systems.
+
+#include <Eigen/Dense>
+#include <memory>
+#include <string>
+
+#include "solvers/bordered_operator.hpp"
+#include "solvers/multigrid/velocity_multigrid.hpp"
+#include "solvers/preconditioner_settings.hpp"
+#include "solvers/pressure_block.hpp"
+
+namespace malleus {
+
+/// The settings with `automatic` replaced by what the viscosities of the system ask for. Collective.
+PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSystem& system);
+
+/// z_p = -S^-1 r_p, z_q = E^-1 r_q, z_v = A^-1 (r_v - B^T z_p - g z_q): A^-1 one multigrid cycle, S = M(1/eta)/2 + C
+/// by Chebyshev steps, E = d - g^T A^-1 g. With the exact blocks a Krylov method would need a few iterations; it
+/// needs 25-30 with these, at any mesh size. Holds no reference to the system it was made from.
+class StokesPreconditioner {
+ public:
+  /// settings: resolved. Collective.
+  StokesPreconditioner(const BorderedOperator& op, const PreconditionerSettings& settings);
+
+  /// The system that the vectors belong to: of the pattern it was made for, values may differ. Must outlive apply().
+  void attach(const BorderedOperator& op) { operator_ = &op; }
+  void apply(const Real* residual, Real* correction);  ///< collective
+
+  std::string summary() const;  ///< one line for the log
+  std::string table() const;    ///< one line a level
+  std::size_t bytes() const;    ///< held by this rank
+
+ private:
+  void make_border_block();
+  void solve_velocity(std::vector<Real>& right_side, Real* correction);
+
+  PreconditionerSettings settings_;
+  const BorderedOperator* operator_;
+  StokesBlocks blocks_;  ///< without the velocity's values once the multigrid has them
+  std::unique_ptr<PressureBlock> pressure_;
+  std::unique_ptr<VelocityMultigrid> velocity_;
+  Eigen::MatrixXd border_inverse_;
+  std::vector<float> pressure_residual_;    ///< [owned node]
+  std::vector<float> pressure_correction_;  ///< [node], with copies
+  std::vector<Real> velocity_residual_;     ///< [owned node][dim]
+  std::vector<Real> velocity_correction_;
+};
+
+inline constexpr const char* stokes_preconditioner_type = "malleus_stokes";
+
+/// Registers the PETSc type "malleus_stokes"; once per process is enough, more do no harm.
+void register_stokes_preconditioner();
+
+/// Makes a PC of that type apply `preconditioner`, which must outlive it; does nothing to other types.
+void use_stokes_preconditioner(PC pc, StokesPreconditioner& preconditioner);
+
+}  // namespace malleus
