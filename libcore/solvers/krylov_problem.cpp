@@ -18,10 +18,10 @@ class KernelPreconditioner {
   KernelPreconditioner(const LinearSystem& system, LinearMethod method) {
     petsc_call(PCCreate(system.comm->raw(), pc_.out()));
     petsc_call(PCSetOptionsPrefix(pc_.get(), "kernel_"));
+    petsc_call(PCSetOperators(pc_.get(), system.matrix, system.matrix));
     if (method == LinearMethod::direct) {
-      set_direct(system);
+      set_direct();
     } else {
-      petsc_call(PCSetOperators(pc_.get(), system.matrix, system.matrix));
       petsc_call(PCSetType(pc_.get(), PCBJACOBI));
     }
     petsc_call(PCSetFromOptions(pc_.get()));
@@ -30,9 +30,7 @@ class KernelPreconditioner {
   PC get() const { return pc_.get(); }
 
  private:
-  void set_direct(const LinearSystem& system) {
-    petsc_call(MatConvert(system.matrix, MATAIJ, MAT_INITIAL_MATRIX, matrix_.out()));
-    petsc_call(PCSetOperators(pc_.get(), matrix_.get(), matrix_.get()));
+  void set_direct() {
     petsc_call(PCSetType(pc_.get(), PCLU));
     petsc_call(PCFactorSetMatSolverType(pc_.get(), MATSOLVERMUMPS));
     petsc_call(PCFactorSetUpMatSolverType(pc_.get()));
@@ -42,7 +40,6 @@ class KernelPreconditioner {
     petsc_call(MatMumpsSetIcntl(factor, null_pivots, 1));
   }
 
-  PetscMatrix matrix_;
   PetscPreconditioner pc_;
 };
 

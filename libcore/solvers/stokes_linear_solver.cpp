@@ -107,36 +107,9 @@ class StokesLinearSolver::Implementation {
     Real iterations_per_digit = 0;  ///< of the first solve; 0 = none yet
   };
 
-<<<<<<< HEAD
-LinearOutcome StokesLinearSolver::Implementation::solve(const LinearSystem& system, const LinearVector& right_side,
-                                                        Real tolerance, LinearVector& solution) {
-  LinearOutcome outcome;
-  const BorderedOperator op(system);
-  PetscSolver ksp;
-  petsc_call(KSPCreate(system.comm->raw(), ksp.out()));
-  petsc_call(KSPSetOperators(ksp.get(), op.matrix(), op.matrix()));
-  petsc_call(MatSetNullSpace(op.matrix(), op.null_space()));
-  petsc_call(KSPSetType(ksp.get(), KSPFGMRES));
-  petsc_call(KSPGMRESSetRestart(ksp.get(), 150));
-  petsc_call(KSPSetTolerances(ksp.get(), tolerance, 0.0, PETSC_DEFAULT, 2000));
-  PetscPreconditioner kernel;
-  petsc_call(PCCreate(system.comm->raw(), kernel.out()));
-  if (system.mesh->total_nodes() <= options_.direct_limit) {
-    petsc_call(PCSetOperators(kernel.get(), system.matrix, system.matrix));
-    petsc_call(PCSetType(kernel.get(), PCLU));
-    petsc_call(PCFactorSetMatSolverType(kernel.get(), MATSOLVERMUMPS));
-    petsc_call(PCFactorSetUpMatSolverType(kernel.get()));
-    Mat factor = nullptr;
-    petsc_call(PCFactorGetMatrix(kernel.get(), &factor));
-    petsc_call(MatMumpsSetIcntl(factor, 24, 1));
-  } else {
-    petsc_call(PCSetOperators(kernel.get(), system.matrix, system.matrix));
-    petsc_call(PCSetType(kernel.get(), PCBJACOBI));
-=======
   static void announce_fallback(const Step& step, LinearOutcome& outcome) {
     ++outcome.fallbacks;
     log::warning("linear solver: {} after {} iterations; trying {}", outcome.reason, outcome.iterations, step.name);
->>>>>>> 82f5002 (Add own smoothed-aggregation multigrid and block-triangular preconditioner for Stokes systems)
   }
 
   /// Runs a step with the set-up that is kept, and again with a new one where that fails.

@@ -1,0 +1,106 @@
+/// Measures the Stokes linear solver on lid cavities: iterations, seconds, matrix products, bytes.
+///
+/// usage: bench_stokes [name=value]... [-- PETSC OPTIONS]
+///   cells=33 (along each axis; 33, 50, 66, 96: 39k, 133k, 301k, 913k nodes)  dim=3  jitter=0.2  tolerance=1e-6
+///   spheres=0 inside=1 (their viscosity; < 1 soft)  disjoint=0  open=0
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <string>
+
+#include "parallel/session.hpp"
+#include "solvers/petsc_objects.hpp"
+#include "solvers/stokes_linear_solver.hpp"
+#include "support/stokes_cavity.hpp"
+
+namespace malleus {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+Real seconds_since(Clock::time_point start) {
+  return std::chrono::duration<Real>(Clock::now() - start).count();
+}
+
+/// A line of /proc/self/status, in bytes.
+Real status_bytes(const std::string& name) {
+  std::ifstream file("/proc/self/status");
+  std::string word;
+  Real kibibytes = 0;
+  while (file >> word) {
+    if (word == name + ":") file >> kibibytes;
+  }
+  return 1024 * kibibytes;
+}
+
+Real seconds_of_product(Mat matrix) {
+  constexpr int products = 10;
+  PetscVector x, y;
+  petsc_call(MatCreateVecs(matrix, x.out(), y.out()));
+  petsc_call(VecSet(x.get(), 1.0));
+  petsc_call(MatMult(matrix, x.get(), y.get()));
+  const auto start = Clock::now();
+  for (int i = 0; i < products; ++i) petsc_call(MatMult(matrix, x.get(), y.get()));
+  return seconds_since(start) / products;
+}
+
+int run(const Communicator& comm, std::map<std::string, Real> values) {
+  test::CavityOptions options;
+  const int cells = static_cast<int>(values["cells"]);
+  options.box = {.dim = static_cast<int>(values["dim"]), .cells = {cells, cells, cells}, .jitter = values["jitter"]};
+  options.spheres = test::spread_spheres(static_cast<int>(values["spheres"]), values["disjoint"] > 0);
+  options.inside = values["inside"];
+  options.is_open = values["open"] > 0;
+  const auto start = Clock::now();
+  const test::StokesCavity cavity(comm, options);
+  const Real assembly = seconds_since(start);
+  const Real before = comm.sum(status_bytes("VmRSS"));
+  const Real product = comm.max(seconds_of_product(cavity.system().matrix));
+  StokesLinearSolver solver;
+  LinearVector solution;
+  const LinearOutcome outcome = solver.solve(cavity.system(), cavity.right_side(), values["tolerance"], solution);
+  const Real peak = comm.sum(status_bytes("VmHWM"));
+  const auto nodes = static_cast<Real>(cavity.mesh().total_nodes());
+  if (comm.is_root()) {
+    fmt::print(
+        "nodes {} ranks {} inside {:.0e} tolerance {:.0e}: {} {} iterations, residual {:.2e}, mesh + assembly {:.2f} "
+        "s, "
+        "set-up {:.2f} s ({:.0f} products), solve {:.2f} s ({:.0f} products), product {:.2f} ms, {:.0f} bytes/node "
+        "over "
+        "the assembled system ({:.0f} in all)\n",
+        cavity.mesh().total_nodes(), comm.size(), options.inside, values["tolerance"],
+        outcome.converged ? "converged," : "FAILED,", outcome.iterations, outcome.residual, assembly,
+        outcome.setup_seconds, outcome.setup_seconds / product, outcome.solve_seconds, outcome.solve_seconds / product,
+        1e3 * product, (peak - before) / nodes, peak / nodes);
+  }
+  return outcome.converged ? 0 : 3;
+}
+
+}  // namespace
+}  // namespace malleus
+
+int main(int argc, char** argv) {
+  std::map<std::string, malleus::Real> values = {{"cells", 33},  {"dim", 3},    {"jitter", 0.2}, {"tolerance", 1e-6},
+                                                 {"spheres", 0}, {"inside", 1}, {"disjoint", 0}, {"open", 0}};
+  std::vector<std::string> petsc_options;
+  bool is_for_petsc = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::size_t equals = word.find('=');
+    if (is_for_petsc) {
+      petsc_options.push_back(word);
+    } else if (word == "--") {
+      is_for_petsc = true;
+    } else if (equals == std::string::npos || values.count(word.substr(0, equals)) == 0) {
+      fmt::print(stderr, "bench_stokes: unknown argument '{}'\n", word);
+      return 2;
+    } else {
+      values[word.substr(0, equals)] = std::stod(word.substr(equals + 1));
+    }
+  }
+  const malleus::Session session(argc, argv, petsc_options);
+  return malleus::run(session.world(), values);
+}

@@ -1,0 +1,97 @@
+#include "support/stokes_cavity.hpp"
+
+#include <cmath>
+
+namespace malleus::test {
+namespace {
+
+constexpr Real on_wall = 1e-9;
+
+bool is_inside(const Sphere& sphere, const Real* point, int dim) {
+  Real square = 0;
+  for (int d = 0; d < dim; ++d) {
+    const Real offset = point[d] - sphere.center[static_cast<std::size_t>(d)];
+    square += offset * offset;
+  }
+  return square < sphere.radius * sphere.radius;
+}
+
+Real lid_speed(const Real* x, int dim) {
+  return dim == 3 ? 16 * x[0] * (1 - x[0]) * x[1] * (1 - x[1]) : 4 * x[0] * (1 - x[0]);
+}
+
+NodeConstraints wall_constraints(const Mesh& mesh, bool is_open) {
+  NodeConstraints constraints(mesh.dim, mesh.nodes());
+  for (LocalId node = 0; node < mesh.nodes(); ++node) {
+    const Real* x = mesh.point(node);
+    bool is_on_wall = false;
+    for (int d = is_open ? mesh.dim - 1 : 0; d < mesh.dim; ++d) {
+      is_on_wall = is_on_wall || x[d] < on_wall || x[d] > 1 - on_wall;
+    }
+    if (!is_on_wall) continue;
+    std::array<Real, 3> velocity{};
+    const bool is_lid = x[mesh.dim - 1] > 1 - on_wall;
+    if (is_lid && is_open) velocity[static_cast<std::size_t>(mesh.dim - 1)] = -1;
+    if (is_lid && !is_open) velocity[0] = lid_speed(x, mesh.dim);
+    constraints.fix_velocity(node, velocity.data());
+  }
+  return constraints;
+}
+
+}  // namespace
+
+std::vector<Sphere> spread_spheres(int count, bool disjoint) {
+  std::uint32_t state = 12345;
+  const auto next = [&] {
+    state = state * 1664525U + 1013904223U;
+    return static_cast<Real>(state >> 8) / 16777216.0;
+  };
+  std::vector<Sphere> spheres;
+  while (static_cast<int>(spheres.size()) < count) {
+    Sphere sphere;
+    for (Real& x : sphere.center) x = 0.15 + 0.7 * next();
+    sphere.radius = 0.05 + 0.08 * next();
+    bool is_apart = true;
+    for (const Sphere& other : spheres) {
+      Real square = 0;
+      for (std::size_t d = 0; d < 3; ++d) square += std::pow(sphere.center[d] - other.center[d], 2);
+      is_apart = is_apart && std::sqrt(square) > sphere.radius + other.radius + 0.07;
+    }
+    if (is_apart || !disjoint) spheres.push_back(sphere);
+  }
+  return spheres;
+}
+
+StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& options)
+    : mesh_(box_mesh(comm, options.box)) {
+  const int dim = mesh_.dim;
+  std::vector<Real> viscosity(static_cast<std::size_t>(mesh_.elements()), options.viscosity_scale);
+  StokesLoads loads;
+  loads.element_force.assign(viscosity.size() * static_cast<std::size_t>(dim), 0.0);
+  for (LocalId element = 0; element < mesh_.elements(); ++element) {
+    std::array<Real, 3> center{};
+    for (const LocalId node : mesh_.nodes_of_element(element)) {
+      for (int d = 0; d < dim; ++d) center[static_cast<std::size_t>(d)] += mesh_.point(node)[d] / (dim + 1);
+    }
+    for (const Sphere& sphere : options.spheres) {
+      if (!is_inside(sphere, center.data(), dim)) continue;
+      viscosity[static_cast<std::size_t>(element)] = options.viscosity_scale * options.inside;
+      loads.element_force[static_cast<std::size_t>((element + 1) * dim - 1)] = -10 * options.viscosity_scale;
+    }
+  }
+  model_ = std::make_unique<GivenViscosity>(std::move(viscosity));
+  equations_ = std::make_unique<StokesOperator>(comm, mesh_, Geometry::plane);
+  equations_->set_viscosity(*model_);
+  equations_->set_constraints(wall_constraints(mesh_, options.is_open));
+  equations_->set_loads(std::move(loads));
+  equations_->set_pressure_free(!options.is_open);
+  equations_->prepare();
+  StokesState state = equations_->start_state();
+  equations_->update_viscosity(state);
+  equations_->residual(state, right_side_);
+  for (Real& value : right_side_.nodes) value = -value;
+  for (Real& value : right_side_.borders) value = -value;
+  system_ = &equations_->tangent(state, false);
+}
+
+}  // namespace malleus::test
