@@ -39,8 +39,7 @@ std::string Key::allowed() const {
 std::string fault_of_exponents(const Key& key, std::string_view name, Real value) {
   for (const auto& [symbol, found] : key.exponents) {
     if (!(std::abs(found - value) <= 1e-9)) {
-      return fmt::format("the unit's power says {} = {}, but {} = {}", symbol, format_real(found), name,
-                         format_real(value));
+      return fmt::format("the unit's power says {} = {:.9g}, but {} = {:.9g}", symbol, found, name, value);
     }
   }
   return {};

@@ -17,6 +17,22 @@ std::string origin_of(const Key& key, const CaseEntry* entry) {
   return "default";
 }
 
+/// A default or starter that its own key refuses is a defect of the description: case.resolved.ini could not be read
+/// again. A member without a meaningful default is a std::optional. Leaves the key's member changed.
+void check_own_values(const std::string& title, const Key& key) {
+  std::vector<std::string> values(key.level_values.begin(), key.level_values.end());
+  values.push_back(key.starter);
+  if (!key.is_required) values.push_back(key.print());
+  for (const std::string& value : values) {
+    try {
+      if (!value.empty()) key.assign(value);
+    } catch (const InputError& error) {
+      check(false,
+            fmt::format("[{}] {} refuses its own default or starter: {}", title, key.name, error.what()).c_str());
+    }
+  }
+}
+
 std::string fault_of_path(const std::filesystem::path& path, PathRule rule) {
   std::error_code failure;
   if (!std::filesystem::exists(path, failure)) return fmt::format("no such file or directory: {}", path.string());
@@ -43,8 +59,10 @@ void CaseReader::describe(std::string_view kind, Occurrence occurrence, int at_l
   description.at_least = at_least;
   description.text = text;
   for (const Key& key : section.keys()) {
+    const std::string default_text = key.print();
+    check_own_values(description.title(), key);
     Key& described = description.keys.emplace_back(key);
-    described.default_text = key.print();
+    described.default_text = default_text;
     described.assign = nullptr;
     described.print = nullptr;
     described.fault_of_exponents = nullptr;
@@ -63,6 +81,7 @@ void CaseReader::close(const Section& section) {
   mistakes_.add(section.mistakes());
   for (const Key& key : section.keys()) {
     const CaseEntry* entry = section.entry(key.name);
+    if (entry == nullptr && section.is_out_of_force(key.name)) continue;
     if (entry != nullptr) note_references(section, key, *entry);
     InForce& value = in_force_.emplace_back();
     value.section = section.title();

@@ -12,7 +12,7 @@
 ///       std::string name;                  // NAME of [body.NAME], set by the reader
 ///       std::string group;
 ///       Law law = Law::norton_hoff;
-///       Real consistency = 0;
+///       std::optional<Real> consistency;   // no default: optional, so that 0 never stands for "not given"
 ///       Real rate_sensitivity = 1;
 ///
 ///       void describe(Section& s) {
@@ -46,6 +46,9 @@
 ///     ... read the mesh ...
 ///     reader.check_mesh({dimension, volume_groups, surface_groups});   // the same for what needs the mesh
 ///     write(reader.resolved(output_directory));
+///
+/// A default (of a key that is not required) and a starter must be values that the key itself accepts, else describing
+/// throws a Defect.
 ///
 /// With a default-constructed CaseReader nothing is read and the same describe() only documents: see help.hpp.
 

@@ -148,6 +148,7 @@ void Section::require(std::string_view key, std::string_view why) {
 }
 
 void Section::refuse(std::string_view key, std::string_view why) {
+  out_of_force_.emplace_back(key);
   if (given(key)) fail(key, fmt::format("not allowed here ({})", why));
 }
 
@@ -162,13 +163,20 @@ void Section::refuse_more_than_one_of(std::initializer_list<std::string_view> ke
   const std::vector<std::string> names(keys.begin(), keys.end());
   std::string_view first;
   for (const std::string_view key : keys) {
-    if (!given(key)) continue;
+    if (!given(key)) {
+      out_of_force_.emplace_back(key);
+      continue;
+    }
     if (first.empty()) {
       first = key;
     } else {
       fail(key, fmt::format("only one of {} may be given, and {} is", join(names), first));
     }
   }
+}
+
+bool Section::is_out_of_force(std::string_view key) const {
+  return std::find(out_of_force_.begin(), out_of_force_.end(), key) != out_of_force_.end();
 }
 
 void Section::read_value(Key& key, const CaseEntry& entry) {

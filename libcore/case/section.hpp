@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.hpp"
 #include "case/case_file.hpp"
 #include "case/key.hpp"
 #include "case/values.hpp"
@@ -78,7 +79,7 @@ class Section {
   void fail(const std::string& message);
   /// A mistake where the key is not given; why: "law = power-law".
   void require(std::string_view key, std::string_view why);
-  /// A mistake where the key is given; why: "law = newtonian has none".
+  /// A mistake where the key is given; why: "law = newtonian". Its default is not in force then.
   void refuse(std::string_view key, std::string_view why);
   /// A mistake unless one, and only one, of the keys is given.
   void require_one_of(std::initializer_list<std::string_view> keys);
@@ -93,6 +94,8 @@ class Section {
   bool may_validate() const { return !has_wrong_choice_; }
   const std::deque<Key>& keys() const { return keys_; }
   const CaseEntry* entry(std::string_view key) const;
+  /// Whether validation found that the key has no meaning here, so that its default is not in force.
+  bool is_out_of_force(std::string_view key) const;
   const Mistakes& mistakes() const { return mistakes_; }
   /// @}
 
@@ -107,6 +110,7 @@ class Section {
   Level level_;
   std::deque<Key> keys_;  ///< a deque: keys stay where they are while more are added
   Mistakes mistakes_;
+  std::vector<std::string> out_of_force_;
   bool has_wrong_choice_ = false;
 };
 
@@ -120,7 +124,14 @@ KeyOf<T> Section::custom(std::string_view name, Member& member, const Converter<
         return;
       }
     }
-    T value = read(raw, key);
+    T value = [&] {
+      try {
+        return read(raw, key);
+      } catch (const InputError& error) {
+        if (key.empty_word.empty()) throw;
+        throw InputError(std::string(error.what()) + ", nor '" + key.empty_word + "'");
+      }
+    }();
     detail::check_numbers(key, value);
     member = std::move(value);
   };
