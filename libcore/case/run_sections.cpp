@@ -71,7 +71,7 @@ Real MeshSettings::length_scale() const {
 }
 
 void TimeSettings::describe(Section& s) {
-  s.real("end", end, "s", "time at which the run ends").above(0);
+  s.real("end", end, "s", "time at which the run ends").above(0).starter("1 s");
   s.real("step", step, "s", "largest increment").above(0).default_is("as large as accuracy and contact allow");
   s.integer("increments", increments, "number of increments after which the run ends").at_least(0);
 }
