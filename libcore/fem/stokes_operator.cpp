@@ -491,15 +491,24 @@ const LinearSystem& StokesOperator::tangent(const StokesState& state, bool newto
   return system_;
 }
 
-void StokesOperator::add_step(const LinearVector& step, Real factor, StokesState& state) const {
-  const int size = mesh_->dim + 1;
-  const Real pressure_factor = factor * system_.pressure_scale;
+void StokesOperator::add_step(const LinearVector& step, Real velocity_factor, Real pressure_factor,
+                              StokesState& state) const {
+  const auto size = static_cast<std::size_t>(mesh_->dim) + 1;
+  const Real scaled = pressure_factor * system_.pressure_scale;
   for (std::size_t i = 0; i < step.nodes.size(); ++i) {
-    const bool is_pressure = static_cast<int>(i % static_cast<std::size_t>(size)) == mesh_->dim;
-    state.nodes[i] += (is_pressure ? pressure_factor : factor) * step.nodes[i];
+    state.nodes[i] += (i % size == size - 1 ? scaled : velocity_factor) * step.nodes[i];
   }
-  for (std::size_t g = 0; g < step.borders.size(); ++g) state.borders[g] += pressure_factor * step.borders[g];
-  mesh_->node_halo.update_copies(state.nodes, size);
+  for (std::size_t g = 0; g < step.borders.size(); ++g) state.borders[g] += scaled * step.borders[g];
+  mesh_->node_halo.update_copies(state.nodes, mesh_->dim + 1);
+}
+
+Real StokesOperator::residual_power(const LinearVector& residual, const LinearVector& step) const {
+  const auto size = static_cast<std::size_t>(mesh_->dim) + 1;
+  Real power = 0;
+  for (std::size_t i = 0; i < step.nodes.size(); ++i) {
+    if (i % size != size - 1) power += residual.nodes[i] * step.nodes[i];
+  }
+  return comm_->sum(power);
 }
 
 std::vector<Real> StokesOperator::reactions(const StokesState& state) {
@@ -514,6 +523,22 @@ std::vector<Real> StokesOperator::reactions(const StokesState& state) {
     }
   }
   return forces;
+}
+
+Real StokesOperator::dissipation(const StokesState& state) const {
+  Real power = 0;
+  with_element(mesh_->dim, geometry_, [&]<class Element>(std::type_identity<Element>) {
+    constexpr int D = Element::dim;
+    for (LocalId e = 0; e < mesh_->elements(); ++e) {
+      const Real viscosity = viscosity_[static_cast<std::size_t>(e)];
+      if (!(viscosity > 0)) continue;
+      const ElementUnknowns<D> values = gather<D>(*mesh_, e, state.nodes);
+      const ElementUnknowns<D> forces = Element(simplex_points<D>(*mesh_, e)).residual(values, viscosity, viscosity);
+      // v.(A v + B^T p) - p.(B v - C p) = v A v + p C p
+      power += forces.velocity.cwiseProduct(values.velocity).sum() - forces.pressure.dot(values.pressure);
+    }
+  });
+  return comm_->sum(power);
 }
 
 WorstNode StokesOperator::worst_node(const LinearVector& residual) const {

@@ -105,13 +105,19 @@ class StokesOperator {
   ResidualReport residual(const StokesState& state, LinearVector& result);
   /// The matrix at the current viscosities: Picard's, or Newton's consistent tangent. Collective.
   const LinearSystem& tangent(const StokesState& state, bool newton);
-  /// state += factor * step, scales undone; copies updated. Collective.
-  void add_step(const LinearVector& step, Real factor, StokesState& state) const;
+  /// Adds a factor times the step's velocities, and another times its pressures and borders, scales undone; copies
+  /// updated. Collective.
+  void add_step(const LinearVector& step, Real velocity_factor, Real pressure_factor, StokesState& state) const;
+  /// Power of the momentum residual over the velocities of a step, both of residual() or a linear solve: W. Collective.
+  Real residual_power(const LinearVector& residual, const LinearVector& step) const;
 
   /// Forces that the constraints exert on the material [N], [owned node][dim]: the unprojected residual with loads and
   /// terms, zero at free nodes to the solver's tolerance. Exact: their power is that of the discrete solution.
   /// Collective.
   std::vector<Real> reactions(const StokesState& state);
+  /// Power dissipated by the viscous stress [W], that of the bubbles (pressure times C times pressure) included: equal
+  /// to the power of loads and constraints. At the current viscosities. Collective.
+  Real dissipation(const StokesState& state) const;
   /// Of a result of residual(). Collective.
   WorstNode worst_node(const LinearVector& residual) const;
 

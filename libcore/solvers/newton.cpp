@@ -16,8 +16,8 @@ constexpr int picard_steps = 3;
 /// Linear solves: the loosest, and gamma of Eisenstat and Walker's second choice (exponent 2).
 constexpr Real loosest_forcing = 1e-2;
 constexpr Real forcing_factor = 0.9;
-/// A step is taken where the residual falls by this share of what the full linear model promises (Armijo).
-constexpr Real sufficient_decrease = 1e-4;
+/// A share of a step is taken where the potential's slope has fallen to this share of that at the start.
+constexpr Real steepest_share = 0.5;
 
 class Stopwatch {
  public:
@@ -41,7 +41,8 @@ class Loop {
   void evaluate();
   bool compute_step(bool newton, Real tolerance);
   bool search(bool newton);
-  void take(Real share);
+  Real power_at(const StokesState& start, Real share);
+  Real cut_share(const StokesState& start, Real slope);
   Real forcing(Real previous_norm);
   bool reached() const { return report_.norm <= options_.tolerance * report_.reference; }
   void give_up(const std::string& reason);
@@ -83,10 +84,6 @@ bool Loop::compute_step(bool newton, Real tolerance) {
   return solved.converged;
 }
 
-void Loop::take(Real share) {
-  op_.add_step(step_, share, state_);
-}
-
 void Loop::give_up(const std::string& reason) {
   outcome_.converged = false;
   outcome_.worst = op_.worst_node(residual_);
@@ -106,7 +103,7 @@ void Loop::solve_linear_problem() {
   const Real goal = options_.linear_tolerance * whole;
   if (report_.norm > goal) {
     if (!compute_step(true, std::min(0.5, goal / report_.norm))) return;
-    take(1);
+    op_.add_step(step_, 1, 1, state_);
     evaluate();
     outcome_.history.back().step = 1;
     outcome_.history.back().residual = report_.relative();
@@ -127,25 +124,55 @@ Real Loop::forcing(Real previous_norm) {
   return std::clamp(options_.linear_tolerance * report_.reference / report_.norm, 1e-10, forcing_);
 }
 
-/// Backtracking on the norm of the residual. False, with the state as before, where no share of a Newton step helps.
+/// Slope [W] of the potential along the step at a share of it; the state is put there.
+Real Loop::power_at(const StokesState& start, Real share) {
+  state_ = start;
+  op_.add_step(step_, share, 1, state_);
+  evaluate();
+  return op_.residual_power(residual_, step_);
+}
+
+/// The share of a Newton step at which the potential's slope has fallen enough, or its best estimate, with the state
+/// there. slope: at share 0, < 0. Illinois' regula falsi between a share that descends and one that rises.
+Real Loop::cut_share(const StokesState& start, Real slope) {
+  Real share = 1;
+  Real low = 0;
+  Real high = 1;
+  Real slope_low = slope;
+  Real slope_high = power_at(start, share);
+  if (slope_high <= steepest_share * -slope) return share;  // so too where the potential still falls
+  for (int cut = 0; cut < options_.max_cuts; ++cut) {
+    const Real width = high - low;
+    const Real secant = low + width * slope_low / (slope_low - slope_high);
+    share = std::clamp(secant, low + 0.1 * width, low + 0.5 * width);
+    const Real here = power_at(start, share);
+    if (std::abs(here) <= steepest_share * -slope) break;
+    (here < 0 ? low : high) = share;
+    (here < 0 ? slope_low : slope_high) = here;
+  }
+  return share;
+}
+
+/// Puts the state at a share of the step. With the new pressures the flow minimises a convex potential, whose slope
+/// along the step is power_at(): Newton's direction descends in it, whatever the norm of the residual does. False, with
+/// the state as before, where it does not (a linear solve that was too loose).
 bool Loop::search(bool newton) {
   const StokesState start = state_;
-  const Real norm = report_.norm;
   Real share = 1;
-  for (int cut = 0; cut <= options_.max_cuts; ++cut, share /= 2) {
-    state_ = start;
-    take(share);
-    evaluate();
-    // Picard's steps need no descent in this norm; they contract in the energy's.
-    if (!newton || report_.norm <= (1 - sufficient_decrease * share) * norm) {
-      outcome_.history.back().step = share;
-      outcome_.history.back().residual = report_.relative();
-      return true;
+  if (newton) {
+    const Real slope = power_at(start, 0);
+    if (!(slope < 0)) {
+      state_ = start;
+      evaluate();
+      return false;
     }
+    share = cut_share(start, slope);
+  } else {
+    power_at(start, share);
   }
-  state_ = start;
-  evaluate();
-  return false;
+  outcome_.history.back().step = share;
+  outcome_.history.back().residual = report_.relative();
+  return true;
 }
 
 void Loop::solve_nonlinear_problem() {

@@ -193,8 +193,8 @@ TEST_P(StokesScene, TangentIsTheDerivativeOfTheResidual) {
     const Real h = 1e-5;
     StokesState ahead = state;
     StokesState behind = state;
-    scene.op.add_step(direction, h, ahead);
-    scene.op.add_step(direction, -h, behind);
+    scene.op.add_step(direction, h, h, ahead);
+    scene.op.add_step(direction, -h, -h, behind);
     const LinearVector above = residual_at(scene.op, ahead);
     const LinearVector below = residual_at(scene.op, behind);
     Real largest = 0;

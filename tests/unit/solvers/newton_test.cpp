@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "fem/boundary_conditions.hpp"
 #include "support/box_mesh.hpp"
 #include "support/world.hpp"
 
@@ -80,6 +81,76 @@ TEST(Newton, FrictionlessUpsettingIsExact) {
       }
     }
   }
+}
+
+/// A square block between sticking platens that close at speed 1; cut-off a hundredth of V/H.
+struct Sticking {
+  explicit Sticking(Real sensitivity)
+      : mesh(box_mesh(world(), {.dim = 2, .cells = {12, 12, 1}, .jitter = 0.15})), op(world(), mesh, Geometry::plane) {
+    std::vector<std::unique_ptr<const ViscousLaw>> laws;
+    laws.push_back(std::make_unique<NortonHoffLaw>(NortonHoff{2, sensitivity, 1e-2}));
+    model = std::make_unique<RegionViscosity>(std::move(laws));
+    std::vector<BoundaryCondition> conditions(2);
+    conditions[0].group = mesh.find_group("y_low");
+    conditions[1].group = mesh.find_group("y_high");
+    conditions[1].kind = ConditionKind::velocity;
+    conditions[1].velocity = {Expression(0), Expression(-1), std::nullopt};
+    op.set_viscosity(*model);
+    op.set_constraints(make_constraints(world(), mesh, Geometry::plane, conditions, 0));
+    op.prepare();
+  }
+
+  Mesh mesh;
+  std::unique_ptr<RegionViscosity> model;
+  StokesOperator op;
+  StokesLinearSolver linear;
+};
+
+TEST(Newton, ConvergesFromAColdStartAtAnySensitivity) {
+  const std::array<std::pair<Real, int>, 5> limits = {{{0.5, 8}, {0.3, 12}, {0.1, 15}, {0.05, 20}, {0.02, 20}}};
+  for (const auto& [sensitivity, limit] : limits) {
+    Sticking block(sensitivity);
+    StokesState state = block.op.start_state();
+    const NewtonOutcome outcome =
+        NewtonSolver({.tolerance = 1e-6, .start_shear_rate = 1}).solve(block.op, block.linear, state);
+    EXPECT_TRUE(outcome.converged) << "m = " << sensitivity << ": " << outcome.reason;
+    EXPECT_LE(outcome.iterations(), limit) << "m = " << sensitivity;
+    EXPECT_LE(outcome.residual, 1e-6);
+    // a good first guess is not thrown away
+    const NewtonOutcome again = NewtonSolver({.tolerance = 1e-6}).solve(block.op, block.linear, state);
+    EXPECT_EQ(again.iterations(), 0);
+  }
+}
+
+TEST(Newton, AnUnconvergedSolveSaysSoAndWhere) {
+  Sticking block(0.1);
+  StokesState state = block.op.start_state();
+  const NewtonOutcome outcome = NewtonSolver({.tolerance = 1e-6, .max_iterations = 4, .start_shear_rate = 1})
+                                    .solve(block.op, block.linear, state);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_EQ(outcome.iterations(), 4);
+  EXPECT_GT(outcome.residual, 1e-6);
+  EXPECT_NE(outcome.reason.find("no convergence"), std::string::npos);
+  EXPECT_GT(outcome.worst.force, 0);
+}
+
+TEST(Newton, PowerOfThePlatensIsThatDissipated) {
+  Sticking block(0.3);
+  StokesState state = block.op.start_state();
+  const NewtonOutcome outcome =
+      NewtonSolver({.tolerance = 1e-8, .start_shear_rate = 1}).solve(block.op, block.linear, state);
+  ASSERT_TRUE(outcome.converged) << outcome.reason;
+  const std::vector<Real> reactions = block.op.reactions(state);
+  Real top = 0;
+  Real all = 0;
+  for (LocalId node = 0; node < block.mesh.owned_nodes(); ++node) {
+    const Real force = reactions[static_cast<std::size_t>(2 * node + 1)];
+    all += force;
+    if (block.mesh.point(node)[1] > 1 - 1e-9) top += force;
+  }
+  EXPECT_NEAR(world().sum(all), 0, 1e-6);  // the platens' forces balance
+  // velocities of 1 at the top: the force is the power; the bubble's part of the dissipation is the pressure's p C p
+  EXPECT_NEAR(-world().sum(top) / block.op.dissipation(state), 1, 1e-6);
 }
 
 }  // namespace
