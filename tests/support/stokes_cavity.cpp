@@ -84,7 +84,6 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   equations_->set_viscosity(*model_);
   equations_->set_constraints(wall_constraints(mesh_, options.is_open));
   equations_->set_loads(std::move(loads));
-  equations_->set_pressure_free(!options.is_open);
   equations_->prepare();
   StokesState state = equations_->start_state();
   equations_->update_viscosity(state);
