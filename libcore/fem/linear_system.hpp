@@ -30,7 +30,7 @@ struct BorderColumn {
 /// `matrix` holds [A B^T; B -C] in blocks of dim+1 a node, (v_1..v_dim, p): MATSEQBAIJ on one rank, MATMPIBAIJ on
 /// several. Rows and columns are the global node numbers of the mesh; a rank has the rows of the nodes it owns.
 /// Pressures are scaled: the unknowns are p/s and q/s, s = `pressure_scale` [Pa.s/m]; so B, g carry s and C carries
-/// s^2, all entries are of the size of A's, and the norm of a residual weighs force and volume alike.
+/// s^2: the dimensionless equations, whose residual weighs force and volume alike on any mesh.
 /// Fixed directions: A = P A' P + (I - P) d, B = B' P (see NodeConstraints), in global axes; right sides and solutions
 /// have no part along them. Nodes that touch no modelled element are fully fixed, with -d in the pressure's row.
 struct LinearSystem {

@@ -222,16 +222,19 @@ void StokesOperator::fix_unmodelled_nodes() {
 }
 
 void StokesOperator::choose_scale() {
-  // s = eta / h with the geometric mean viscosity: A, s B and s^2 C are then of one size.
-  std::array<Real, 2> sums{};
+  // s = eta / L, with the geometric mean viscosity and the size of what is modelled: the dimensionless equations. In
+  // their norm a tolerance means the same on any mesh (with an element's size for L it would not).
+  std::array<Real, 3> sums{};
   for (std::size_t e = 0; e < viscosity_.size(); ++e) {
     if (!(viscosity_[e] > 0)) continue;
     sums[0] += volume_[e] * std::log(viscosity_[e]);
     sums[1] += volume_[e];
+    sums[2] += 1;
   }
   comm_->sum_in_place(sums);
   const Real viscosity = sums[1] > 0 ? std::exp(sums[0] / sums[1]) : 1;
-  system_.pressure_scale = viscosity / length_;
+  system_.pressure_scale = viscosity / (length_ * std::pow(std::max(1.0, sums[2]), 1.0 / mesh_->dim));
+  stiffness_ = viscosity * std::pow(length_, mesh_->dim - 2);
   scale_is_chosen_ = true;
 }
 
@@ -476,8 +479,7 @@ const LinearSystem& StokesOperator::tangent(const StokesState& state, bool newto
     TangentSink sink(extended_constraints_, *matrix_);
     for (const ResidualTerm* term : terms_) term->add_tangent(*space_, unknowns, sink);
   }
-  // eta h^(D-2), with eta = s h
-  matrix_->finish(system_.pressure_scale * std::pow(length_, mesh_->dim - 1));
+  matrix_->finish(stiffness_);
   scale_borders();
   system_.comm = comm_;
   system_.mesh = mesh_;

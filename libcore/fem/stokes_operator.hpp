@@ -167,7 +167,8 @@ class StokesOperator {
   std::unique_ptr<NodeSpace> space_;
   std::unique_ptr<SystemMatrix> matrix_;
   LinearSystem system_;
-  Real length_ = 1;  ///< of a typical element, m
+  Real length_ = 1;     ///< of a typical element, m
+  Real stiffness_ = 1;  ///< eta h^(dim-2), of the size of A's entries
   bool scale_is_chosen_ = false;
   std::vector<Real> node_volume_;  ///< [owned node] integral of phi over what is modelled, m^3; where pressure is free
   std::vector<GateColumn> gate_columns_;
