@@ -28,12 +28,12 @@ Pose Tool::pose(Real time, Real stroke) const {
   return pose;
 }
 
-void Tool::plan(Real time, const Displacement& displacement) {
+void Tool::plan(Real time, const Displacement& displacement, Real speed_time) {
   const bool advances = motion_.direction.squaredNorm() > 0;
   const Real stroke = press_.state().stroke;
   start_ = pose(time, stroke);
   end_ = pose(time + displacement.step, stroke + (advances ? press_.travel(time, displacement) : 0));
-  speed_ = advances ? press_.speed(time) : 0;
+  speed_ = advances ? press_.speed(speed_time) : 0;
 }
 
 void Tool::contacts_at_start(const Vector& point, Real reach, std::vector<SurfaceContact>& found) const {
@@ -50,6 +50,11 @@ Real Tool::distance_at_end(const Vector& point) const {
 
 Vector Tool::velocity_at(const Vector& point) const {
   return speed_ * motion_.direction + motion_.rotation.cross(point - start_.pivot - start_.shift);
+}
+
+Real Tool::nominal_speed() const {
+  if (!(motion_.direction.squaredNorm() > 0)) return 0;
+  return std::abs(press_.speed(0));
 }
 
 Real Tool::largest_speed(const Bounds& scene) const {

@@ -39,8 +39,9 @@ class Tool {
   const ToolMotion& motion() const noexcept { return motion_; }
   bool moves() const noexcept { return motion_.direction.squaredNorm() > 0 || motion_.rotation.squaredNorm() > 0; }
 
-  /// Fixes the poses at the start and the end of the increment that starts at `time`.
-  void plan(Real time, const Displacement& displacement);
+  /// Fixes the poses at the start and the end of the increment that starts at `time`, and the velocity at speed_time.
+  void plan(Real time, const Displacement& displacement, Real speed_time);
+  void plan(Real time, const Displacement& displacement) { plan(time, displacement, time); }
   const Pose& start() const noexcept { return start_; }
   const Pose& end() const noexcept { return end_; }
 
@@ -53,6 +54,7 @@ class Tool {
   Vector velocity_at(const Vector& point) const;
   /// Resistance [N] that the press feels under the force `on_tool` [N]: its part against the direction of motion.
   Real resistance(const Vector& on_tool) const { return -on_tool.dot(motion_.direction); }
+  Real nominal_speed() const;                     ///< that of the press at the start, m/s
   Real largest_speed(const Bounds& scene) const;  ///< of any of its points within the scene, m/s
 
  private:

@@ -1,0 +1,348 @@
+#include "forge/contact_flow.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "base/log.hpp"
+
+namespace malleus::forge {
+namespace {
+
+constexpr int most_searches = 4;  ///< of contact points in one solve, where tools are curved
+constexpr int most_passes = 12;   ///< of augmentation and friction limits
+constexpr int most_plans = 25;    ///< of a hydraulic press
+/// A node may end this share of an edge deeper in a tool than its linearised gap says.
+constexpr Real tolerated_surprise = 0.02;
+
+LinearMethod linear_method(LinearChoice choice) {
+  switch (choice) {
+    case LinearChoice::gmres_ilu:
+      return LinearMethod::gmres_ilu;
+    case LinearChoice::conjugate_residual:
+      return LinearMethod::conjugate_residual;
+    case LinearChoice::block_triangular:
+      break;
+  }
+  return LinearMethod::block_triangular;
+}
+
+}  // namespace
+
+ContactFlow::ContactFlow(Scene& scene)
+    : scene_(scene), linear_({.method = linear_method(scene.solver.linear_method)}), contact_(scene.dim()) {
+  mesh_changed();
+}
+
+std::string ContactFlow::purpose() const {
+  std::string text = "velocity and pressure by Newton's method";
+  if (!scene_.tools.empty()) text += ", " + std::to_string(scene_.tools.size()) + " rigid tools";
+  if (!scene_.pairs.empty()) text += ", " + std::to_string(scene_.pairs.size()) + " contacts between bodies";
+  return text;
+}
+
+FieldUse ContactFlow::uses() const {
+  return {{}, {field_name::velocity, field_name::pressure, field_name::strain_rate, field_name::viscosity}, {}};
+}
+
+void ContactFlow::mesh_changed() {
+  operator_ = std::make_unique<StokesOperator>(*scene_.comm, scene_.mesh, scene_.geometry);
+  operator_->set_viscosity(*scene_.viscosity);
+  linear_.reset();
+  memory_.clear();
+  contact_.points().clear();
+}
+
+void ContactFlow::save() {
+  saved_.fields.clear();
+  for (const Field* field : std::as_const(scene_.fields).all()) {
+    saved_.fields.emplace_back(field->values().begin(), field->values().end());
+  }
+  saved_.memory = memory_;
+  saved_.presses.clear();
+  for (const Tool& tool : scene_.tools) saved_.presses.push_back(tool.press().state());
+  saved_.targets = scene_.progress.volume_targets;
+  saved_.report = report_;
+  saved_.edge_rate = edge_rate_;
+  saved_.strain_rate = strain_rate_;
+  saved_.was_pushed = scene_.progress.was_pushed;
+}
+
+void ContactFlow::roll_back() {
+  std::size_t i = 0;
+  for (Field* field : scene_.fields.all()) field->assign(saved_.fields[i++]);
+  memory_ = saved_.memory;
+  for (std::size_t t = 0; t < scene_.tools.size(); ++t) scene_.tools[t].press().restore(saved_.presses[t]);
+  scene_.progress.volume_targets = saved_.targets;
+  report_ = saved_.report;
+  edge_rate_ = saved_.edge_rate;
+  strain_rate_ = saved_.strain_rate;
+  scene_.progress.was_pushed = saved_.was_pushed;
+}
+
+Outcome ContactFlow::advance(const Increment& increment) {
+  save();
+  report_ = {};
+  const std::vector<Real> start = scene_.mesh.coordinates;
+  const Outcome outcome = run_stages(increment);
+  scene_.mesh.coordinates = start;
+  if (outcome.kind != Outcome::Kind::done) roll_back();
+  return outcome;
+}
+
+Outcome ContactFlow::solve_once() {
+  return advance({0, scene_.progress.time + 1e-6 / scene_.scale.rate(), 1e-6 / scene_.scale.rate()});
+}
+
+/// The solve at the start of the increment gives the forces and the fields; Runge-Kutta solves again at the middle.
+Outcome ContactFlow::run_stages(const Increment& increment) {
+  const Real last_step = scene_.progress.last_step;
+  TimeScheme scheme = scene_.motion.scheme;
+  if (scheme == TimeScheme::adams_bashforth_2 && !(last_step > 0)) scheme = TimeScheme::runge_kutta_2;
+  const auto velocity = std::as_const(scene_.fields)[field_name::velocity].values();
+  const auto strain_rate = std::as_const(scene_.fields)[field_name::strain_rate].values();
+  const std::vector<Real> last_rate(strain_rate.begin(), strain_rate.end());
+  Stage stage;
+  stage.start_time = increment.start();
+  stage.time = increment.start();
+  stage.displacement = scheme == TimeScheme::adams_bashforth_2 ? adams_bashforth_step(increment.dt, last_step)
+                                                               : euler_step(increment.dt);
+  stage.start = scene_.mesh.coordinates;
+  stage.before.assign(velocity.begin(), velocity.end());
+  if (const Outcome outcome = solve_under_presses(stage); outcome.kind != Outcome::Kind::done) return outcome;
+
+  const Displacement& way = stage.displacement;
+  scene_.step_velocity.resize(velocity.size());
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    scene_.step_velocity[i] = way.now * velocity[i] + way.before * stage.before[i];
+  }
+  scene_.step_strain_rate.resize(strain_rate.size());
+  for (std::size_t e = 0; e < strain_rate.size(); ++e) {
+    scene_.step_strain_rate[e] = std::max(0.0, way.now * strain_rate[e] + way.before * last_rate[e]);
+  }
+  if (scheme == TimeScheme::runge_kutta_2 && scene_.progress.was_pushed) return run_midpoint(increment, stage);
+  return Outcome::done();
+}
+
+Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first) {
+  std::vector<std::vector<Real>> at_start;
+  for (const Field* field : std::as_const(scene_.fields).all()) {
+    at_start.emplace_back(field->values().begin(), field->values().end());
+  }
+  const FlowReport report = report_;
+  const std::vector<ContactMemory> memory = memory_;
+  for (std::size_t i = 0; i < scene_.mesh.coordinates.size(); ++i) {
+    scene_.mesh.coordinates[i] = first.start[i] + 0.5 * increment.dt * scene_.step_velocity[i];
+  }
+  Stage stage = first;
+  stage.time = increment.start() + 0.5 * increment.dt;
+  for (Tool& tool : scene_.tools) tool.plan(stage.start_time, stage.displacement, stage.time);
+  const Outcome outcome = solve(stage);
+  if (outcome.kind != Outcome::Kind::done) return outcome;
+  const auto velocity = std::as_const(scene_.fields)[field_name::velocity].values();
+  scene_.step_velocity.assign(velocity.begin(), velocity.end());
+  const auto strain_rate = std::as_const(scene_.fields)[field_name::strain_rate].values();
+  scene_.step_strain_rate.assign(strain_rate.begin(), strain_rate.end());
+  std::size_t i = 0;
+  for (Field* field : scene_.fields.all()) field->assign(at_start[i++]);
+  const int iterations = report_.newton_iterations;
+  report_ = report;
+  report_.newton_iterations = iterations;
+  memory_ = memory;
+  return Outcome::done();
+}
+
+/// Presses with a force limit change their speed until force and speed agree.
+Outcome ContactFlow::solve_under_presses(const Stage& stage) {
+  const Real tolerance = std::max(10 * scene_.solver.newton_tolerance, 1e-6);
+  for (int plan = 0; plan < most_plans; ++plan) {
+    for (Tool& tool : scene_.tools) tool.plan(stage.start_time, stage.displacement);
+    if (const Outcome outcome = solve(stage); outcome.kind != Outcome::Kind::done) return outcome;
+    bool accepted = true;
+    for (std::size_t t = 0; t < scene_.tools.size(); ++t) {
+      Tool& tool = scene_.tools[t];
+      const Real resistance = tool.resistance(report_.tool_forces[t]);
+      accepted = tool.press().accepts(resistance, stage.start_time, tolerance) && accepted;
+    }
+    if (accepted) return Outcome::done();
+  }
+  return Outcome::retry("a press found no speed at which its force limit holds");
+}
+
+Outcome ContactFlow::solve(const Stage& stage) {
+  const FreeSurface surface(*scene_.comm, scene_.mesh, scene_.geometry, scene_.boundaries->is_free());
+  state_.nodes.resize(static_cast<std::size_t>(scene_.mesh.nodes()) * static_cast<std::size_t>(scene_.dim() + 1));
+  const Field& velocity = scene_.fields[field_name::velocity];
+  const Field& pressure = scene_.fields[field_name::pressure];
+  const auto dim = static_cast<std::size_t>(scene_.dim());
+  for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+    Real* unknowns = state_.nodes.data() + static_cast<std::size_t>(node) * (dim + 1);
+    std::copy_n(velocity.at(node), dim, unknowns);
+    unknowns[dim] = *pressure.at(node);
+  }
+  if (const Outcome outcome = solve_contacts(stage, surface); outcome.kind != Outcome::Kind::done) return outcome;
+  measure_forces();
+  store_fields();
+  measure_rates();
+  return Outcome::done();
+}
+
+Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surface) {
+  for (int search = 0; search < most_searches; ++search) {
+    find_points(stage, surface);
+    scene_.progress.was_pushed = is_pushed(stage.time);
+    if (!scene_.progress.was_pushed) {
+      rest();
+      return Outcome::done();
+    }
+    prepare_operator(stage);
+    for (int pass = 0;; ++pass) {
+      if (const Outcome outcome = run_newton(); outcome.kind != Outcome::Kind::done) return outcome;
+      if (!update_contacts(stage, surface, pass)) break;
+      if (pass == most_passes) return Outcome::retry("the contact pressures did not settle");
+    }
+    if (surprise(stage, surface) <= tolerated_surprise) return Outcome::done();
+  }
+  return Outcome::retry("nodes end within a tool");
+}
+
+Vector ContactFlow::velocity_of(LocalId node) const {
+  const auto at = static_cast<std::size_t>(node) * static_cast<std::size_t>(scene_.dim() + 1);
+  return to_vector(state_.nodes.data() + at, scene_.dim());
+}
+
+Vector ContactFlow::position_at_end(const Stage& stage, LocalId node) const {
+  const auto at = static_cast<std::size_t>(node) * static_cast<std::size_t>(scene_.dim());
+  const Displacement& way = stage.displacement;
+  return to_vector(stage.start.data() + at, scene_.dim()) +
+         way.step * (way.now * velocity_of(node) + way.before * to_vector(stage.before.data() + at, scene_.dim()));
+}
+
+Prediction ContactFlow::predict(const Stage& stage) const {
+  Prediction prediction;
+  prediction.effective_step = stage.displacement.step * stage.displacement.now;
+  Real speed = 0;
+  Bounds box;
+  for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+    prediction.positions.push_back(position_at_end(stage, node));
+    prediction.velocities.push_back(velocity_of(node));
+    speed = std::max(speed, prediction.velocities.back().norm());
+    box.add(prediction.positions.back());
+  }
+  for (const Tool& tool : scene_.tools) speed = std::max(speed, box.empty() ? 0 : tool.largest_speed(box));
+  prediction.largest_motion = scene_.comm->max(std::max(speed, scene_.scale.speed)) * stage.displacement.step;
+  return prediction;
+}
+
+void ContactFlow::find_points(const Stage& stage, const FreeSurface& surface) {
+  const std::vector<Real> shear_stress = has_limited_friction() ? nodal_shear_stress() : std::vector<Real>();
+  ContactScene contact_scene;
+  contact_scene.surface = &surface;
+  contact_scene.tools = &scene_.tools;
+  contact_scene.pairs = scene_.pairs;
+  contact_scene.bodies = scene_.body_scales;
+  contact_scene.shear_stress = shear_stress;
+  contact_scene.memory = memory_;
+  contact_scene.settings = scene_.contact;
+  contact_.points() = find_contacts(*scene_.comm, contact_scene, predict(stage));
+  std::vector<GlobalId> wanted;
+  for (const ContactPoint& point : contact_.points()) {
+    for (const GlobalId master : point.masters) {
+      if (master >= 0) wanted.push_back(master);
+    }
+  }
+  contact_space_ = std::make_unique<NodeSpace>(*scene_.comm, scene_.mesh, wanted);
+  has_contacts_ = scene_.comm->any(!contact_.points().empty());
+}
+
+/// Whether anything would act on bodies at rest.
+bool ContactFlow::is_pushed(Real time) const {
+  if (scene_.boundaries->has_loads() || scene_.boundaries->largest_speed(time) > 0) return true;
+  bool pushed = false;
+  for (const ContactPoint& point : contact_.points()) {
+    const Real closing = point.normal.offset + point.normal.normal.dot(point.opponent_velocity);
+    pushed = pushed || closing > 1e-9 * scene_.scale.speed;
+  }
+  return scene_.comm->any(pushed);
+}
+
+void ContactFlow::rest() {
+  std::fill(state_.nodes.begin(), state_.nodes.end(), 0.0);
+  contact_.points().clear();
+  tractions_.clear();
+  gaps_.clear();
+  memory_.clear();
+  has_contacts_ = false;
+}
+
+void ContactFlow::prepare_operator(const Stage& stage) {
+  StokesLoads loads = scene_.boundaries->loads(stage.time);
+  volume_targets(stage.displacement, loads);
+  operator_->set_constraints(scene_.boundaries->constraints(stage.time));
+  operator_->set_loads(std::move(loads));
+  std::vector<const ResidualTerm*> terms;
+  if (has_contacts_) terms.push_back(&contact_);
+  operator_->set_terms(std::move(terms));
+  operator_->prepare();
+  operator_->impose_constraints(state_);
+}
+
+/// Asks each body's lost volume back: the displacement of the increment shall have div = ln(V0 / V).
+void ContactFlow::volume_targets(const Displacement& way, StokesLoads& loads) {
+  const bool by_scheme = scene_.motion.scheme != TimeScheme::euler;
+  const VolumeTarget choice = scene_.motion.volume_target;
+  if (choice == VolumeTarget::no || (choice == VolumeTarget::automatic && !by_scheme)) return;
+  std::vector<Real> targets;
+  for (std::size_t region = 0; region < scene_.bodies.size(); ++region) {
+    const Body& body = scene_.bodies[region];
+    Real target = 0;
+    if (body.is_deformable() && body.volume > 0) {
+      const Real asked = std::log(body.start_volume / body.volume) / way.step;
+      target = (asked - way.before * saved_.targets[region]) / way.now;
+    }
+    targets.push_back(target);
+  }
+  scene_.progress.volume_targets = targets;
+  for (const std::int32_t region : scene_.mesh.element_region) {
+    loads.element_divergence.push_back(targets[static_cast<std::size_t>(region)]);
+  }
+}
+
+Outcome ContactFlow::run_newton() {
+  NewtonOptions options;
+  options.tolerance = scene_.solver.newton_tolerance;
+  options.linear_tolerance = scene_.solver.linear_tolerance;
+  options.max_iterations = scene_.solver.max_newton;
+  options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
+  const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
+  report_.newton_iterations += outcome.iterations();
+  totals_.linear_solves += outcome.linear_solves;
+  totals_.linear_iterations += outcome.linear_iterations;
+  totals_.linear_failures += outcome.converged ? 0 : 1;
+  totals_.assembly_seconds += outcome.assembly_seconds;
+  totals_.setup_seconds += outcome.setup_seconds;
+  totals_.solve_seconds += outcome.solve_seconds;
+  for (const NewtonIteration& iteration : outcome.history) {
+    log::debug("  {} residual {:.2e} step {:.2g}, {} linear iterations", iteration.newton ? "newton" : "picard",
+               iteration.residual, iteration.step, iteration.linear_iterations);
+  }
+  return outcome.converged ? Outcome::done() : Outcome::retry(outcome.reason);
+}
+
+Real ContactFlow::time_to_touch(Real time) {
+  Real least = std::numeric_limits<Real>::infinity();
+  const FreeSurface surface(*scene_.comm, scene_.mesh, scene_.geometry, scene_.boundaries->is_free());
+  for (Tool& tool : scene_.tools) {
+    tool.plan(time, euler_step(0));
+    const Real speed = tool.velocity_at(tool.start().pivot).norm();
+    if (!(speed > 0)) continue;
+    for (const LocalId node : surface.nodes()) {
+      const auto body = static_cast<std::size_t>(surface.body_of_node(node));
+      if (!scene_.bodies[body].is_deformable()) continue;
+      const Real distance = tool.distance_at_end(to_vector(scene_.mesh.point(node), scene_.dim()));
+      least = std::min(least, distance > 1e-9 * scene_.scale.height ? distance / speed : 0.0);
+    }
+  }
+  return scene_.comm->min(least);
+}
+
+}  // namespace malleus::forge

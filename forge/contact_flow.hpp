@@ -1,0 +1,130 @@
+#pragma once
+
+/// The velocity and pressure of the bodies, with what holds and pushes them.
+
+#include "engine/component.hpp"
+#include "forge/scene.hpp"
+#include "solvers/newton.hpp"
+
+namespace malleus::forge {
+
+/// What an increment's solves took and left, for history.csv.
+struct FlowReport {
+  int newton_iterations = 0;
+  std::vector<Vector> tool_forces;      ///< [tool] N, on it
+  std::vector<Vector> body_forces;      ///< [region] N, on it as a master
+  std::vector<Vector> boundary_forces;  ///< [boundary] N, on what imposes it
+  Real force_imbalance = 0;             ///< sum of the forces that are left over, relative to the largest one
+  Real max_penetration = 0;             ///< m, at the end of the increment as the conditions see it
+  int contacts = 0;                     ///< active contact points
+};
+
+/// Totals of a run.
+struct FlowTotals {
+  GlobalId linear_solves = 0;
+  GlobalId linear_iterations = 0;
+  GlobalId linear_failures = 0;
+  Real assembly_seconds = 0;
+  Real setup_seconds = 0;
+  Real solve_seconds = 0;
+};
+
+/// Paper, eq. [5] to [7]: Stokes flow of the bodies under contact and friction with tools and with each other. Writes
+/// velocity, pressure, viscosity and strain rate, and the velocity by which the mesh goes in this increment.
+class ContactFlow final : public Component {
+ public:
+  explicit ContactFlow(Scene& scene);
+
+  std::string name() const override { return "flow"; }
+  std::string purpose() const override;
+  FieldUse uses() const override;
+  Outcome advance(const Increment& increment) override;
+  void roll_back() override;
+  Outcome solve_once() override;
+
+  const FlowReport& report() const noexcept { return report_; }
+  const FlowTotals& totals() const noexcept { return totals_; }
+  /// Drops what belongs to the old mesh. Collective.
+  void mesh_changed();
+  /// The largest rate at which an edge or an element of the last solution strains, 1/s; 0 before the first.
+  Real largest_edge_rate() const noexcept { return edge_rate_; }
+  Real largest_strain_rate() const noexcept { return strain_rate_; }
+  void set_rates(Real edge_rate, Real strain_rate) {  ///< after a restart
+    edge_rate_ = edge_rate;
+    strain_rate_ = strain_rate;
+  }
+  /// Smallest distance of a moving tool to the bodies over its speed [s]: the time until something happens where
+  /// nothing is pushed yet. Infinite where no tool moves. Collective.
+  Real time_to_touch(Real time);
+
+ private:
+  /// One solve of an increment.
+  struct Stage {
+    Real start_time = 0;        ///< s, of the increment
+    Real time = 0;              ///< s, at which velocities and loads are imposed
+    Displacement displacement;  ///< how the increment ends
+    std::vector<Real> start;    ///< [local node][dim] coordinates at the increment's start, m
+    std::vector<Real> before;   ///< [local node][dim] velocity of the increment before, m/s
+  };
+  /// What roll_back() needs.
+  struct Saved {
+    std::vector<std::vector<Real>> fields;
+    std::vector<ContactMemory> memory;
+    std::vector<PressState> presses;
+    std::vector<Real> targets;
+    FlowReport report;
+    Real edge_rate = 0;
+    Real strain_rate = 0;
+    bool was_pushed = false;
+  };
+
+  void save();
+  Outcome run_stages(const Increment& increment);
+  Outcome run_midpoint(const Increment& increment, const Stage& first);
+  Outcome solve_under_presses(const Stage& stage);
+  Outcome solve(const Stage& stage);
+  Outcome solve_contacts(const Stage& stage, const FreeSurface& surface);
+  Prediction predict(const Stage& stage) const;
+  void find_points(const Stage& stage, const FreeSurface& surface);
+  bool is_pushed(Real time) const;
+  void rest();
+  void prepare_operator(const Stage& stage);
+  Outcome run_newton();
+  void volume_targets(const Displacement& displacement, StokesLoads& loads);
+
+  /// Slips of the contact points at the solution, and from them pressures, gaps and what is remembered. Whether the
+  /// solution asks for another pass (augmentation; limits of friction that moved). Collective.
+  bool update_contacts(const Stage& stage, const FreeSurface& surface, int pass);
+  bool update_friction(const FreeSurface& surface);
+  /// Largest depth at which a node ends within a tool that its linearised gap did not foresee, in edges. Collective.
+  Real surprise(const Stage& stage, const FreeSurface& surface);
+  void measure_forces();
+  void store_fields();
+  void measure_rates();
+  Vector position_at_end(const Stage& stage, LocalId node) const;
+  Vector velocity_of(LocalId node) const;
+  std::vector<Real> nodal_shear_stress() const;
+  const FrictionSpec& friction_of(int opponent) const;
+  bool has_limited_friction() const;
+
+  Scene& scene_;
+  std::unique_ptr<StokesOperator> operator_;
+  StokesLinearSolver linear_;
+  ContactTerm contact_;
+  StokesState state_;
+  std::vector<ContactMemory> memory_;         ///< sorted by slave, opponent
+  std::vector<ContactTraction> tractions_;    ///< [contact point] at the solution
+  std::vector<Real> gaps_;                    ///< [contact point] m, at the end of the increment
+  std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
+  bool has_contacts_ = false;                 ///< on any rank
+  FlowReport report_;
+  FlowTotals totals_;
+  Saved saved_;
+  Real edge_rate_ = 0;
+  Real strain_rate_ = 0;
+};
+
+/// Stress deviator and mean of an element at the fields' solution: xx yy xy, or xx yy zz xy yz xz, Pa. Local.
+void compute_stress(const Scene& scene, std::span<Real> stress);
+
+}  // namespace malleus::forge

@@ -1,0 +1,338 @@
+#include "forge/forge_process.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/error.hpp"
+
+namespace malleus::forge {
+namespace {
+
+constexpr Real no_limit = std::numeric_limits<Real>::infinity();
+
+nlohmann::json press_json(const PressState& state) {
+  return {{"stroke", state.stroke},
+          {"speed", state.speed},
+          {"last_speed", state.last_speed},
+          {"last_force", state.last_force},
+          {"allowed_speed", state.allowed_speed},
+          {"stopped", state.stopped}};
+}
+
+PressState press_state(const nlohmann::json& json) {
+  PressState state;
+  state.stroke = json.at("stroke");
+  state.speed = json.at("speed");
+  state.last_speed = json.at("last_speed");
+  state.last_force = json.at("last_force");
+  state.allowed_speed = json.at("allowed_speed");
+  state.stopped = json.at("stopped");
+  return state;
+}
+
+}  // namespace
+
+ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
+    : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
+  if (case_.common.probes.empty()) return;
+  probes_.emplace(*scene_->comm, scene_->mesh, case_.common.probes);
+  if (probes_->any_moves()) tracers_.emplace(*probes_, scene_->mesh, scene_->fields);
+}
+
+std::vector<Component*> ForgeProcess::components() {
+  std::vector<Component*> list = {&flow_};
+  if (tracers_) list.push_back(&*tracers_);
+  list.push_back(&motion_);
+  return list;
+}
+
+std::vector<LeftOut> ForgeProcess::left_out() const {
+  std::vector<LeftOut> list;
+  if (scene_->tools.empty()) list.push_back({"rigid tools", "no [tool.NAME] section"});
+  if (scene_->pairs.empty()) list.push_back({"contact between bodies", "no [contact.NAME] section"});
+  if (!case_.common.thermal) list.push_back({"heat equation", "no [thermal] section"});
+  if (!case_.common.inertia) list.push_back({"inertia", "no [inertia] section"});
+  if (!case_.common.gravity) list.push_back({"gravity", "no [gravity] section"});
+  if (!case_.common.remesh) list.push_back({"remeshing", "no [remesh] section"});
+  for (const Body& body : scene_->bodies) {
+    if (!body.is_deformable()) list.push_back({"deformation of " + body.name, "law = rigid: no unknowns"});
+  }
+  return list;
+}
+
+std::vector<std::string> ForgeProcess::accuracy_settings() const {
+  return {fmt::format("newton_tolerance {:g}, linear_tolerance {:g}, cutoff_strain_rate {:g} of {:.3g} 1/s",
+                      scene_->solver.newton_tolerance, scene_->solver.linear_tolerance,
+                      scene_->solver.cutoff_strain_rate, scene_->scale.rate()),
+          fmt::format("penalty {:g}{}, slip_scale {:g}", scene_->penalty.penalty,
+                      scene_->penalty.augmented ? " augmented" : "", scene_->penalty.slip_scale),
+          fmt::format("largest change of an edge in a step {:g}{}", scene_->motion.edge_share,
+                      std::isfinite(planned_strain()) ? fmt::format(", largest strain {:g}", planned_strain()) : "")};
+}
+
+Forecast ForgeProcess::forecast() const {
+  // Measured on small scenes: seconds per node and Newton iteration, iterations an increment, bytes per node.
+  constexpr Real seconds_per_node = 4e-4;
+  constexpr Real iterations = 4;
+  constexpr Real bytes_per_node = 12e3;
+  Forecast forecast;
+  const auto nodes = static_cast<Real>(scene_->mesh.total_nodes());
+  Real step = std::min(case_.time.step.value_or(no_limit), planned_strain() / scene_->scale.rate());
+  step = std::min(step, scene_->motion.edge_share / scene_->scale.rate());
+  Real count = case_.time.increments ? *case_.time.increments : no_limit;
+  if (case_.time.end) count = std::min(count, std::ceil(*case_.time.end / step));
+  if (case_.time.stroke) count = std::min(count, std::ceil(*case_.time.stroke / (scene_->scale.speed * step)));
+  forecast.increments = static_cast<GlobalId>(std::min(count, 1e9));
+  forecast.wall_s = count * nodes * iterations * seconds_per_node / scene_->comm->size();
+  forecast.memory_bytes = nodes * bytes_per_node + 6e7 * scene_->comm->size();
+  return forecast;
+}
+
+std::vector<std::string> ForgeProcess::output_fields() const {
+  std::vector<std::string> names;
+  for (const Field* field : std::as_const(scene_->fields).all()) names.push_back(field->spec().name);
+  return names;
+}
+
+/// The largest strain in a step, where the case does not leave steps to [time] step.
+Real ForgeProcess::planned_strain() const {
+  if (case_.motion.strain) return *case_.motion.strain;
+  if (case_.time.step) return no_limit;
+  constexpr std::array<Real, n_levels> by_level = {0.03, 0.015, 0.007, 0.0035};
+  return by_level[static_cast<std::size_t>(case_.common.accuracy.level)];
+}
+
+Real ForgeProcess::largest_step() {
+  const Real edge_rate = flow_.largest_edge_rate() > 0 ? flow_.largest_edge_rate() : scene_->scale.rate();
+  const Real strain_rate = flow_.largest_strain_rate() > 0 ? flow_.largest_strain_rate() : scene_->scale.rate();
+  Real step = std::min(scene_->motion.edge_share / edge_rate, planned_strain() / strain_rate);
+  for (std::size_t t = 0; t < scene_->tools.size(); ++t) {
+    if (flow_.report().tool_forces.empty()) break;
+    const Tool& tool = scene_->tools[t];
+    step = std::min(step, tool.press().step_limit(tool.resistance(flow_.report().tool_forces[t])));
+  }
+  if (case_.time.stroke && leading_stroke()) {
+    const Real remaining = *case_.time.stroke - *leading_stroke();
+    const Real speed = leading_speed();
+    if (speed > 0) step = std::min(step, std::max(remaining, 1e-6 * *case_.time.stroke) / speed);
+  }
+  if (!scene_->progress.was_pushed && !scene_->boundaries->has_loads() &&
+      !(scene_->boundaries->largest_speed(scene_->progress.time) > 0)) {
+    const Real free = flow_.time_to_touch(scene_->progress.time);
+    if (free > 0) step = std::min(case_.time.step.value_or(no_limit), std::isfinite(free) ? free : step);
+  }
+  return step;
+}
+
+std::optional<Real> ForgeProcess::leading_stroke() const {
+  for (const Tool& tool : scene_->tools) {
+    if (tool.motion().direction.squaredNorm() > 0) return std::abs(tool.press().state().stroke);
+  }
+  for (std::size_t i = 0; i < scene_->boundaries->settings().size(); ++i) {
+    const auto mean = scene_->boundaries->mean_velocity(i, scene_->progress.time);
+    if (to_vector(mean.data(), 3).norm() > 0 || scene_->progress.boundary_strokes[i] > 0) {
+      return scene_->progress.boundary_strokes[i];
+    }
+  }
+  return std::nullopt;
+}
+
+Real ForgeProcess::leading_speed() const {
+  for (const Tool& tool : scene_->tools) {
+    if (tool.motion().direction.squaredNorm() > 0) return std::abs(tool.press().speed(scene_->progress.time));
+  }
+  for (std::size_t i = 0; i < scene_->boundaries->settings().size(); ++i) {
+    const auto mean = scene_->boundaries->mean_velocity(i, scene_->progress.time);
+    const Real speed = to_vector(mean.data(), 3).norm();
+    if (speed > 0) return speed;
+  }
+  return 0;
+}
+
+std::optional<std::string> ForgeProcess::finished() {
+  if (case_.time.stroke && leading_stroke().value_or(0) >= *case_.time.stroke * (1 - 1e-9)) return "stroke reached";
+  bool all_stopped = !scene_->tools.empty() && !(scene_->boundaries->largest_speed(scene_->progress.time) > 0);
+  for (const Tool& tool : scene_->tools) {
+    if (tool.moves()) all_stopped = all_stopped && tool.press().state().stopped;
+  }
+  bool any_moves = false;
+  for (const Tool& tool : scene_->tools) any_moves = any_moves || tool.moves();
+  if (any_moves && all_stopped) return "the presses came to rest";
+  return std::nullopt;
+}
+
+void ForgeProcess::refresh_outputs() {
+  const Mesh& mesh = scene_->mesh;
+  auto region = scene_->fields[field_name::region].values();
+  auto partition = scene_->fields[field_name::partition].values();
+  auto quality = scene_->fields[field_name::quality].values();
+  with_dim(mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < mesh.elements(); ++e) {
+      const auto i = static_cast<std::size_t>(e);
+      region[i] = mesh.element_region[i];
+      partition[i] = scene_->comm->rank();
+      quality[i] = simplex_quality<D>(simplex_points<D>(mesh, e));
+    }
+  });
+  compute_stress(*scene_, scene_->fields[field_name::stress].values());
+}
+
+std::vector<ForgeProcess::Opponent> ForgeProcess::opponents() const {
+  std::vector<Opponent> list;
+  for (std::size_t t = 0; t < scene_->tools.size(); ++t) {
+    list.push_back({Opponent::Kind::tool, t, scene_->tools[t].name()});
+  }
+  const auto is_new = [&](const std::string& name) {
+    return std::none_of(list.begin(), list.end(), [&](const Opponent& one) { return one.name == name; });
+  };
+  for (const BodyPair& pair : scene_->pairs) {
+    const std::string& name = scene_->bodies[static_cast<std::size_t>(pair.master)].name;
+    if (is_new(name)) list.push_back({Opponent::Kind::body, static_cast<std::size_t>(pair.master), name});
+  }
+  for (std::size_t i = 0; i < scene_->boundaries->settings().size(); ++i) {
+    const BoundarySettings& boundary = scene_->boundaries->settings()[i];
+    if (boundary.has_velocity() && is_new(boundary.name)) list.push_back({Opponent::Kind::boundary, i, boundary.name});
+  }
+  return list;
+}
+
+Vector ForgeProcess::force_on(const Opponent& opponent) const {
+  const FlowReport& report = flow_.report();
+  const std::vector<Vector>& forces = opponent.kind == Opponent::Kind::tool   ? report.tool_forces
+                                      : opponent.kind == Opponent::Kind::body ? report.body_forces
+                                                                              : report.boundary_forces;
+  return opponent.index < forces.size() ? forces[opponent.index] : Vector(Vector::Zero());
+}
+
+Real ForgeProcess::stroke_of(const Opponent& opponent) const {
+  switch (opponent.kind) {
+    case Opponent::Kind::tool:
+      return scene_->tools[opponent.index].press().state().stroke;
+    case Opponent::Kind::body:
+      return scene_->progress.body_strokes[opponent.index];
+    case Opponent::Kind::boundary:
+      return scene_->progress.boundary_strokes[opponent.index];
+  }
+  return 0;
+}
+
+std::vector<std::string> ForgeProcess::history_columns() const {
+  std::vector<std::string> columns = {"newton_iterations", "volume_change", "min_quality", "max_penetration_m",
+                                      "remeshed"};
+  for (const Opponent& one : opponents()) {
+    for (int c = 0; c < scene_->dim(); ++c) columns.push_back(fmt::format("force_{}_{}_N", one.name, "xyz"[c]));
+    columns.push_back(fmt::format("stroke_{}_m", one.name));
+  }
+  return columns;
+}
+
+std::vector<HistoryCell> ForgeProcess::history_row() {
+  const FlowReport& report = flow_.report();
+  max_penetration_ = std::max(max_penetration_, report.max_penetration);
+  max_imbalance_ = std::max(max_imbalance_, report.force_imbalance);
+  newton_total_ += report.newton_iterations;
+  ++increments_;
+  std::vector<HistoryCell> row = {static_cast<Real>(report.newton_iterations), volume_change(),
+                                  smallest_quality(*scene_), report.max_penetration, 0.0};
+  for (const Opponent& one : opponents()) {
+    const Vector force = force_on(one);
+    for (int c = 0; c < scene_->dim(); ++c) row.emplace_back(force[c]);
+    row.emplace_back(stroke_of(one));
+  }
+  return row;
+}
+
+Real ForgeProcess::volume() const {
+  Real sum = 0;
+  for (const Body& body : scene_->bodies) sum += body.volume;
+  return sum;
+}
+
+Real ForgeProcess::volume_change() const {
+  Real start = 0;
+  for (const Body& body : scene_->bodies) start += body.is_deformable() ? body.start_volume : 0;
+  return start > 0 ? scene_->deformable_volume() / start - 1 : 0;
+}
+
+std::string ForgeProcess::increment_note() const {
+  const FlowReport& report = flow_.report();
+  std::string note = fmt::format("newton {}, volume {:+.1e}", report.newton_iterations, volume_change());
+  for (const Opponent& one : opponents()) note += fmt::format(", F {} {:.4g} N", one.name, force_on(one).norm());
+  return note;
+}
+
+LinearTotals ForgeProcess::linear_totals() const {
+  const FlowTotals& totals = flow_.totals();
+  return {totals.linear_solves,    totals.linear_iterations, totals.linear_failures,
+          totals.assembly_seconds, totals.setup_seconds,     totals.solve_seconds};
+}
+
+nlohmann::json ForgeProcess::accuracy() {
+  return {{"volume_change", volume_change()},
+          {"raw_volume_drift", scene_->progress.raw_volume_drift},
+          {"max_penetration_m", max_penetration_},
+          {"force_imbalance", max_imbalance_},
+          {"newton_iterations", newton_total_}};
+}
+
+std::vector<std::string> ForgeProcess::closing_lines() {
+  return {
+      fmt::format("volume {:+.2e} (without targets {:+.2e}); deepest penetration {:.2e} m; forces balance to {:.1e}",
+                  volume_change(), scene_->progress.raw_volume_drift, max_penetration_, max_imbalance_)};
+}
+
+nlohmann::json ForgeProcess::save_state() const {
+  const Progress& progress = scene_->progress;
+  nlohmann::json state = {{"time", progress.time},
+                          {"last_step", progress.last_step},
+                          {"raw_volume_drift", progress.raw_volume_drift},
+                          {"was_pushed", progress.was_pushed},
+                          {"boundary_strokes", progress.boundary_strokes},
+                          {"body_strokes", progress.body_strokes},
+                          {"volume_targets", progress.volume_targets},
+                          {"max_penetration", max_penetration_},
+                          {"max_imbalance", max_imbalance_},
+                          {"newton_total", newton_total_},
+                          {"edge_rate", flow_.largest_edge_rate()},
+                          {"strain_rate", flow_.largest_strain_rate()}};
+  for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
+  for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
+  return state;
+}
+
+void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
+                           const nlohmann::json& state) {
+  scene_->mesh = std::move(mesh);
+  for (Field* field : scene_->fields.all()) {
+    field->assign(std::vector<Real>(FieldStore::entities(scene_->mesh, field->spec().support) *
+                                    static_cast<std::size_t>(field->components())));
+  }
+  for (auto& [spec, values] : fields) scene_->fields.declare(scene_->mesh, spec).assign(std::move(values));
+  Progress& progress = scene_->progress;
+  progress.time = state.at("time");
+  progress.last_step = state.at("last_step");
+  progress.raw_volume_drift = state.at("raw_volume_drift");
+  progress.was_pushed = state.at("was_pushed");
+  progress.boundary_strokes = state.at("boundary_strokes").get<std::vector<Real>>();
+  progress.body_strokes = state.at("body_strokes").get<std::vector<Real>>();
+  progress.volume_targets = state.at("volume_targets").get<std::vector<Real>>();
+  max_penetration_ = state.at("max_penetration");
+  max_imbalance_ = state.at("max_imbalance");
+  newton_total_ = state.at("newton_total");
+  scene_->boundaries->mesh_changed();
+  flow_.mesh_changed();
+  flow_.set_rates(state.at("edge_rate"), state.at("strain_rate"));
+  const std::vector<Real> volumes = body_volumes(*scene_);
+  for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+    scene_->bodies[i].start_volume = state.at("start_volumes").at(i);
+    scene_->bodies[i].volume = volumes[i];
+  }
+  for (std::size_t t = 0; t < scene_->tools.size(); ++t) {
+    scene_->tools[t].press().restore(press_state(state.at("presses").at(t)));
+  }
+}
+
+}  // namespace malleus::forge

@@ -1,0 +1,68 @@
+#pragma once
+
+/// The forging process as the engine runs it.
+
+#include <optional>
+
+#include "engine/process.hpp"
+#include "forge/motion.hpp"
+
+namespace malleus::forge {
+
+class ForgeProcess final : public Process {
+ public:
+  /// Takes the scene of the case; the case must outlive it.
+  ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene);
+
+  const Mesh& mesh() const override { return scene_->mesh; }
+  FieldStore& fields() override { return scene_->fields; }
+  std::vector<Component*> components() override;
+  std::vector<LeftOut> left_out() const override;
+  std::vector<std::string> accuracy_settings() const override;
+  Forecast forecast() const override;
+  std::vector<std::string> output_fields() const override;
+  Real largest_step() override;
+  std::optional<std::string> finished() override;
+  void refresh_outputs() override;
+  std::vector<std::string> history_columns() const override;
+  std::vector<HistoryCell> history_row() override;
+  Real volume() const override;
+  Probes* probes() override { return probes_ ? &*probes_ : nullptr; }
+  std::string increment_note() const override;
+  LinearTotals linear_totals() const override;
+  nlohmann::json accuracy() override;
+  std::vector<std::string> closing_lines() override;
+  nlohmann::json save_state() const override;
+  void restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
+               const nlohmann::json& state) override;
+
+ private:
+  /// One that history.csv gives the force and stroke of.
+  struct Opponent {
+    enum class Kind { tool, body, boundary };
+    Kind kind = Kind::tool;
+    std::size_t index = 0;
+    std::string name;
+  };
+  std::vector<Opponent> opponents() const;
+  Vector force_on(const Opponent& opponent) const;
+  Real stroke_of(const Opponent& opponent) const;
+  std::optional<Real> leading_stroke() const;
+  Real leading_speed() const;
+  Real planned_strain() const;
+  Real volume_change() const;
+
+  const ForgeCase& case_;
+  std::unique_ptr<Scene> scene_;
+  std::optional<Probes> probes_;
+  ContactFlow flow_;
+  std::optional<TracerMotion> tracers_;
+  Motion motion_;
+  int last_newton_ = 0;
+  Real max_penetration_ = 0;  ///< of the run, m
+  Real max_imbalance_ = 0;
+  GlobalId newton_total_ = 0;
+  GlobalId increments_ = 0;
+};
+
+}  // namespace malleus::forge
