@@ -3,51 +3,14 @@
 #include <cmath>
 
 #include "base/error.hpp"
-#include "forge/free_surface.hpp"
+#include "mesh/simplex.hpp"
 
 namespace malleus::forge {
 namespace {
 
-/// Facets of one symmetry plane differ in their normals by rounding alone; planes differ by more than this (rad).
-constexpr Real plane_angle = 0.05;
-/// A constraint of a node as it travels to copies: count, three directions, velocity, pressure flag.
-constexpr int packed_size = 14;
-
 std::array<Real, 3> point_at(const Mesh& mesh, LocalId node) {
   const Real* x = mesh.point(node);
   return {x[0], x[1], mesh.dim == 3 ? x[2] : 0.0};
-}
-
-void pack(const NodeConstraints& constraints, LocalId node, Real* packed) {
-  const int dim = constraints.dim();
-  const int fixed = constraints.fixed_directions(node);
-  packed[0] = fixed;
-  const auto directions = constraints.directions(node);
-  for (int i = 0; i < fixed * dim; ++i) packed[1 + i] = directions[static_cast<std::size_t>(i)];
-  std::array<Real, 3> velocity = {0, 0, 0};
-  constraints.impose(node, velocity.data());
-  for (int c = 0; c < dim; ++c) packed[10 + c] = velocity[static_cast<std::size_t>(c)];
-  packed[13] = constraints.is_pressure_fixed(node) ? 1 : 0;
-}
-
-void unpack(const Real* packed, LocalId node, NodeConstraints& constraints) {
-  const int dim = constraints.dim();
-  for (int i = 0; i < static_cast<int>(packed[0]); ++i) {
-    constraints.fix_direction(node, packed + 1 + i * dim, packed + 10);
-  }
-  if (packed[13] != 0) constraints.fix_pressure(node);
-}
-
-/// Copies get the constraints of their owners.
-void share(const Mesh& mesh, NodeConstraints& constraints) {
-  std::vector<Real> packed(static_cast<std::size_t>(mesh.nodes()) * packed_size, 0.0);
-  for (LocalId node = 0; node < mesh.owned_nodes(); ++node) {
-    pack(constraints, node, packed.data() + static_cast<std::size_t>(node) * packed_size);
-  }
-  mesh.node_halo.update_copies(packed, packed_size);
-  for (LocalId node = mesh.owned_nodes(); node < mesh.nodes(); ++node) {
-    unpack(packed.data() + static_cast<std::size_t>(node) * packed_size, node, constraints);
-  }
 }
 
 }  // namespace
@@ -60,13 +23,11 @@ Boundaries::Boundaries(const Communicator& comm, const Mesh& mesh, Geometry geom
 
 void Boundaries::mesh_changed() {
   is_free_.assign(mesh_->group_names.size() + 1, 1);
-  std::vector<char> is_symmetry(is_free_.size(), 0);
   nodes_.clear();
   for (std::size_t i = 0; i < settings_.size(); ++i) {
     const auto group = static_cast<std::size_t>(group_of(i) + 1);
     check(group > 0, "the groups of boundaries are in the mesh");
     const bool symmetric = settings_[i].type == BoundarySettings::Type::symmetry;
-    if (symmetric) is_symmetry[group] = 1;
     if (symmetric || settings_[i].has_velocity()) is_free_[group] = 0;
     nodes_.push_back(nodes_of(i));
   }
@@ -74,16 +35,6 @@ void Boundaries::mesh_changed() {
   for (LocalId e = 0; e < mesh_->elements(); ++e) {
     for (const LocalId node : mesh_->nodes_of_element(e)) {
       node_body_[static_cast<std::size_t>(node)] = mesh_->element_region[static_cast<std::size_t>(e)];
-    }
-  }
-  symmetry_.clear();
-  const FreeSurface planes(*comm_, *mesh_, geometry_, is_symmetry);
-  for (std::size_t i = 0; i < planes.nodes().size(); ++i) {
-    auto& [node, normals] = symmetry_.emplace_back();
-    node = planes.nodes()[i];
-    for (const Vector& share : planes.shares(i)) {
-      const Vector normal = share.normalized();
-      normals.push_back({normal[0], normal[1], normal[2]});
     }
   }
 }
@@ -115,64 +66,48 @@ std::array<Real, 3> Boundaries::velocity_at(std::size_t boundary, const Real* po
 }
 
 NodeConstraints Boundaries::constraints(Real time) const {
-  NodeConstraints constraints(mesh_->dim, mesh_->nodes());
+  std::vector<BoundaryCondition> conditions;
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    const std::int32_t group = group_of(i);
+    if (settings_[i].type == BoundarySettings::Type::symmetry) {
+      conditions.push_back({group, ConditionKind::symmetry, {}});
+    } else if (settings_[i].has_velocity()) {
+      conditions.push_back({group, ConditionKind::velocity, settings_[i].imposed_velocity()});
+    }
+  }
+  NodeConstraints constraints = make_constraints(*comm_, *mesh_, geometry_, conditions, time);
   add_rigid_bodies(constraints, time);
-  add_symmetry(constraints);
-  add_velocities(constraints, time);
-  share(*mesh_, constraints);
   return constraints;
 }
 
-void Boundaries::add_symmetry(NodeConstraints& constraints) const {
-  const std::array<Real, 3> at_rest = {0, 0, 0};
-  for (const auto& [node, normals] : symmetry_) {
-    for (const auto& normal : normals) constraints.fix_direction(node, normal.data(), at_rest.data(), plane_angle);
-  }
-  if (geometry_ != Geometry::axisymmetric) return;
-  const std::array<Real, 3> radial = {1, 0, 0};
-  for (LocalId node = 0; node < mesh_->owned_nodes(); ++node) {
-    if (!(mesh_->point(node)[0] > 0)) constraints.fix_direction(node, radial.data(), at_rest.data());
-  }
-}
-
-void Boundaries::add_velocities(NodeConstraints& constraints, Real time) const {
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (!settings_[i].has_velocity()) continue;
-    const ExpressionVector components = settings_[i].imposed_velocity();
-    for (const LocalId node : nodes_[i]) {
-      if (node >= mesh_->owned_nodes()) break;
-      const std::array<Real, 3> velocity = velocity_at(i, mesh_->point(node), time);
-      for (std::size_t c = 0; c < static_cast<std::size_t>(mesh_->dim); ++c) {
-        std::array<Real, 3> axis = {0, 0, 0};
-        axis[c] = 1;
-        if (components[c]) constraints.fix_direction(node, axis.data(), velocity.data());
-      }
-    }
-  }
-}
-
+/// A rigid body has the mean of the velocities imposed on its nodes.
 void Boundaries::add_rigid_bodies(NodeConstraints& constraints, Real time) const {
   for (std::size_t region = 0; region < body_loads_.is_rigid.size(); ++region) {
     if (body_loads_.is_rigid[region] == 0) continue;
     std::array<Real, 4> sums = {0, 0, 0, 0};
     for (std::size_t i = 0; i < settings_.size(); ++i) {
-      if (!settings_[i].has_velocity()) continue;
-      for (const LocalId node : nodes_[i]) {
-        if (node >= mesh_->owned_nodes() || node_body_[static_cast<std::size_t>(node)] != static_cast<int>(region))
-          continue;
-        const std::array<Real, 3> velocity = velocity_at(i, mesh_->point(node), time);
-        for (std::size_t c = 0; c < 3; ++c) sums[c] += velocity[c];
-        sums[3] += 1;
-      }
+      if (settings_[i].has_velocity()) add_velocities(i, static_cast<std::int32_t>(region), time, sums);
     }
     comm_->sum_in_place(sums);
     std::array<Real, 3> velocity = {0, 0, 0};
     for (std::size_t c = 0; c < 3 && sums[3] > 0; ++c) velocity[c] = sums[c] / sums[3];
-    for (LocalId node = 0; node < mesh_->owned_nodes(); ++node) {
-      if (node_body_[static_cast<std::size_t>(node)] != static_cast<int>(region)) continue;
+    for (LocalId node = 0; node < mesh_->nodes(); ++node) {
+      if (node_body_[static_cast<std::size_t>(node)] != static_cast<std::int32_t>(region)) continue;
       constraints.fix_velocity(node, velocity.data());
+      constraints.set_velocity(node, velocity.data());
       constraints.fix_pressure(node);
     }
+  }
+}
+
+/// Velocities imposed by a boundary on this rank's owned nodes of a region (-1: of any), and their count.
+void Boundaries::add_velocities(std::size_t boundary, std::int32_t region, Real time, std::array<Real, 4>& sums) const {
+  for (const LocalId node : nodes_[boundary]) {
+    if (node >= mesh_->owned_nodes()) break;
+    if (region >= 0 && node_body_[static_cast<std::size_t>(node)] != region) continue;
+    const std::array<Real, 3> velocity = velocity_at(boundary, mesh_->point(node), time);
+    for (std::size_t c = 0; c < 3; ++c) sums[c] += velocity[c];
+    sums[3] += 1;
   }
 }
 
@@ -199,51 +134,13 @@ StokesLoads Boundaries::loads(Real time) const {
       }
     }
   }
+  std::vector<BoundaryLoad> tractions;
   for (std::size_t i = 0; i < settings_.size(); ++i) {
-    const BoundarySettings& boundary = settings_[i];
-    if (!boundary.has_traction() && !boundary.pressure) continue;
-    const std::array<Expression, 3> imposed = boundary.imposed_traction();
-    const int group = group_of(i);
-    with_dim(dim, [&](auto d) {
-      constexpr int D = decltype(d)::value;
-      for (LocalId facet = 0; facet < mesh_->exterior_facets; ++facet) {
-        if (mesh_->facet_group[static_cast<std::size_t>(facet)] != group) continue;
-        const Point<D> normal = facet_area_normal<D>(facet_points<D>(*mesh_, facet)).normalized();
-        FacetTraction traction;
-        traction.facet = facet;
-        for (int k = 0; k < D; ++k) {
-          const auto place = point_at(*mesh_, mesh_->nodes_of_facet(facet)[static_cast<std::size_t>(k)]);
-          const Real pressure = boundary.pressure ? (*boundary.pressure)(place, time) : 0;
-          for (int c = 0; c < D; ++c) {
-            traction.traction[static_cast<std::size_t>(k * D + c)] =
-                imposed[static_cast<std::size_t>(c)](place, time) - pressure * normal[c];
-          }
-        }
-        loads.tractions.push_back(traction);
-      }
-    });
+    if (!settings_[i].has_traction() && !settings_[i].pressure) continue;
+    tractions.push_back({group_of(i), settings_[i].imposed_traction(), settings_[i].pressure});
   }
+  loads.tractions = make_tractions(*comm_, *mesh_, tractions, time);
   return loads;
-}
-
-bool Boundaries::is_closed() const {
-  std::vector<char> is_held(is_free_.size(), 0);
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    const ExpressionVector components = settings_[i].imposed_velocity();
-    bool all = settings_[i].has_velocity();
-    for (std::size_t c = 0; c < static_cast<std::size_t>(mesh_->dim); ++c) all = all && components[c].has_value();
-    if (all || settings_[i].type == BoundarySettings::Type::symmetry) {
-      is_held[static_cast<std::size_t>(group_of(i) + 1)] = 1;
-    }
-  }
-  bool closed = true;
-  for (LocalId facet = 0; facet < mesh_->exterior_facets; ++facet) {
-    const auto region = static_cast<std::size_t>(
-        mesh_->element_region[static_cast<std::size_t>(mesh_->facet_element[static_cast<std::size_t>(facet)])]);
-    const bool held = is_held[static_cast<std::size_t>(mesh_->facet_group[static_cast<std::size_t>(facet)] + 1)] != 0;
-    closed = closed && (held || body_loads_.is_rigid[region] != 0);
-  }
-  return comm_->all(closed);
 }
 
 Real Boundaries::largest_speed(Real time) const {
@@ -260,12 +157,7 @@ Real Boundaries::largest_speed(Real time) const {
 
 std::array<Real, 3> Boundaries::mean_velocity(std::size_t i, Real time) const {
   std::array<Real, 4> sums = {0, 0, 0, 0};
-  for (const LocalId node : nodes_[i]) {
-    if (node >= mesh_->owned_nodes()) break;
-    const auto velocity = velocity_at(i, mesh_->point(node), time);
-    for (std::size_t c = 0; c < 3; ++c) sums[c] += velocity[c];
-    sums[3] += 1;
-  }
+  add_velocities(i, -1, time, sums);
   comm_->sum_in_place(sums);
   std::array<Real, 3> mean = {0, 0, 0};
   for (std::size_t c = 0; c < 3 && sums[3] > 0; ++c) mean[c] = sums[c] / sums[3];

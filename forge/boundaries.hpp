@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "case/scene_sections.hpp"
+#include "fem/boundary_conditions.hpp"
 #include "fem/stokes_operator.hpp"
 
 namespace malleus::forge {
@@ -26,18 +27,16 @@ class Boundaries {
   /// To be called when the mesh was changed. Collective.
   void mesh_changed();
 
-  /// The constraints at a time [s], alike on all holders of a node. Where several boundaries meet, earlier ones win.
-  /// A rigid body moves with the velocity imposed on its boundary; without one it rests. Collective.
+  /// The constraints at a time [s], alike on all holders of a node. Where boundaries meet, velocities win over
+  /// symmetry. A rigid body moves with the velocity imposed on its boundary; without one it rests. Collective.
   NodeConstraints constraints(Real time) const;
-  /// Tractions, pressures and body forces at a time [s]. Local.
+  /// Tractions, pressures and body forces at a time [s]. Collective.
   StokesLoads loads(Real time) const;
 
   const std::vector<BoundarySettings>& settings() const noexcept { return settings_; }
   /// [group + 1] whether tools and bodies may touch it: no velocity and no symmetry is imposed there.
   const std::vector<char>& is_free() const noexcept { return is_free_; }
   bool has_loads() const;
-  /// Whether the velocity is imposed in every direction on the whole surface of the scene. Collective.
-  bool is_closed() const;
   /// The largest velocity imposed at a time [m/s]. Collective.
   Real largest_speed(Real time) const;
   /// Mean of the velocity imposed on settings()[i] at a time [m/s]; free components are 0. Collective.
@@ -50,8 +49,7 @@ class Boundaries {
 
  private:
   std::vector<LocalId> nodes_of(std::size_t boundary) const;
-  void add_symmetry(NodeConstraints& constraints) const;
-  void add_velocities(NodeConstraints& constraints, Real time) const;
+  void add_velocities(std::size_t boundary, std::int32_t region, Real time, std::array<Real, 4>& sums) const;
   void add_rigid_bodies(NodeConstraints& constraints, Real time) const;
   std::array<Real, 3> velocity_at(std::size_t boundary, const Real* point, Real time) const;
   int group_of(std::size_t boundary) const { return mesh_->find_group(settings_[boundary].group); }
@@ -64,8 +62,6 @@ class Boundaries {
   std::vector<char> is_free_;
   std::vector<std::vector<LocalId>> nodes_;  ///< [boundary] held nodes on it, owned and copies, increasing
   std::vector<std::int32_t> node_body_;      ///< [local node] region
-  /// Directions that symmetry fixes: [owned node of symmetry][up to 3 unit vectors].
-  std::vector<std::pair<LocalId, std::vector<std::array<Real, 3>>>> symmetry_;
 };
 
 }  // namespace malleus::forge

@@ -65,10 +65,10 @@ Bounds bounds_of_deformable(const Scene& scene) {
 /// Without any motion imposed: the rate at which the loads deform the softest body.
 Real rate_of_loads(const Scene& scene, Real height) {
   Real stress = 0;
-  for (const FacetTraction& traction : scene.boundaries->loads(0).tractions) {
+  const StokesLoads loads = scene.boundaries->loads(0);
+  for (const FacetTraction& traction : loads.tractions) {
     for (const Real t : traction.traction) stress = std::max(stress, std::abs(t));
   }
-  const StokesLoads loads = scene.boundaries->loads(0);
   for (const Real f : loads.element_force) stress = std::max(stress, std::abs(f) * height);
   for (const Real f : loads.node_force) stress = std::max(stress, std::abs(f) * height);
   stress = scene.comm->max(stress);

@@ -44,6 +44,8 @@ class ContactFlow final : public Component {
 
   const FlowReport& report() const noexcept { return report_; }
   const FlowTotals& totals() const noexcept { return totals_; }
+  /// Nothing fixed the mean pressure of the last solve.
+  bool pressure_is_free() const { return operator_->pressure_is_free(); }
   /// Drops what belongs to the old mesh. Collective.
   void mesh_changed();
   /// The largest rate at which an edge or an element of the last solution strains, 1/s; 0 before the first.

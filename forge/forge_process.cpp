@@ -36,6 +36,7 @@ PressState press_state(const nlohmann::json& json) {
 
 ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
     : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
+  if (case_.common.reference) errors_.emplace(*scene_, flow_, *case_.common.reference);
   if (case_.common.probes.empty()) return;
   probes_.emplace(*scene_->comm, scene_->mesh, case_.common.probes);
   if (probes_->any_moves()) tracers_.emplace(*probes_, scene_->mesh, scene_->fields);
@@ -43,6 +44,7 @@ ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> s
 
 std::vector<Component*> ForgeProcess::components() {
   std::vector<Component*> list = {&flow_};
+  if (errors_) list.push_back(&*errors_);
   if (tracers_) list.push_back(&*tracers_);
   list.push_back(&motion_);
   return list;
@@ -271,11 +273,13 @@ LinearTotals ForgeProcess::linear_totals() const {
 }
 
 nlohmann::json ForgeProcess::accuracy() {
-  return {{"volume_change", volume_change()},
-          {"raw_volume_drift", scene_->progress.raw_volume_drift},
-          {"max_penetration_m", max_penetration_},
-          {"force_imbalance", max_imbalance_},
-          {"newton_iterations", newton_total_}};
+  nlohmann::json json = {{"volume_change", volume_change()},
+                         {"raw_volume_drift", scene_->progress.raw_volume_drift},
+                         {"max_penetration_m", max_penetration_},
+                         {"force_imbalance", max_imbalance_},
+                         {"newton_iterations", newton_total_}};
+  if (errors_) json["errors"] = errors_->errors();
+  return json;
 }
 
 std::vector<std::string> ForgeProcess::closing_lines() {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "engine/process.hpp"
+#include "forge/known_errors.hpp"
 #include "forge/motion.hpp"
 
 namespace malleus::forge {
@@ -56,6 +57,7 @@ class ForgeProcess final : public Process {
   std::unique_ptr<Scene> scene_;
   std::optional<Probes> probes_;
   ContactFlow flow_;
+  std::optional<KnownErrors> errors_;
   std::optional<TracerMotion> tracers_;
   Motion motion_;
   int last_newton_ = 0;
