@@ -167,15 +167,11 @@ std::optional<std::string> ForgeProcess::finished() {
 
 void ForgeProcess::refresh_outputs() {
   const Mesh& mesh = scene_->mesh;
-  auto region = scene_->fields[field_name::region].values();
-  auto partition = scene_->fields[field_name::partition].values();
   auto quality = scene_->fields[field_name::quality].values();
   with_dim(mesh.dim, [&](auto d) {
     constexpr int D = decltype(d)::value;
     for (LocalId e = 0; e < mesh.elements(); ++e) {
       const auto i = static_cast<std::size_t>(e);
-      region[i] = mesh.element_region[i];
-      partition[i] = scene_->comm->rank();
       quality[i] = simplex_quality<D>(simplex_points<D>(mesh, e));
     }
   });

@@ -82,8 +82,6 @@ inline constexpr const char* equivalent_strain = "equivalent_strain";
 inline constexpr const char* stress = "stress";
 inline constexpr const char* contact_pressure = "contact_pressure";
 inline constexpr const char* contact_gap = "contact_gap";
-inline constexpr const char* region = "region";
-inline constexpr const char* partition = "partition";
 inline constexpr const char* quality = "quality";
 }  // namespace field_name
 
