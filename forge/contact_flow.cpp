@@ -14,22 +14,26 @@ constexpr int most_plans = 25;    ///< of a hydraulic press
 /// A node may end this share of an edge deeper in a tool than its linearised gap says.
 constexpr Real tolerated_surprise = 0.02;
 
-LinearMethod linear_method(LinearChoice choice) {
+LinearSolverOptions linear_options(LinearChoice choice) {
+  LinearSolverOptions options;
   switch (choice) {
     case LinearChoice::gmres_ilu:
-      return LinearMethod::gmres_ilu;
+      options.method = LinearMethod::gmres_ilu;
+      break;
     case LinearChoice::conjugate_residual:
-      return LinearMethod::conjugate_residual;
+      options.method = LinearMethod::conjugate_residual;
+      break;
     case LinearChoice::block_triangular:
+      options.method = LinearMethod::block_triangular;
       break;
   }
-  return LinearMethod::block_triangular;
+  return options;
 }
 
 }  // namespace
 
 ContactFlow::ContactFlow(Scene& scene)
-    : scene_(scene), linear_({.method = linear_method(scene.solver.linear_method)}), contact_(scene.dim()) {
+    : scene_(scene), linear_(linear_options(scene.solver.linear_method)), contact_(scene.dim()) {
   mesh_changed();
 }
 

@@ -98,6 +98,7 @@ class ContactFlow final : public Component {
   /// solution asks for another pass (augmentation; limits of friction that moved). Collective.
   bool update_contacts(const Stage& stage, const FreeSurface& surface, int pass);
   bool update_friction(const FreeSurface& surface);
+  bool update_rubbing(int pass);
   /// Largest depth at which a node ends within a tool that its linearised gap did not foresee, in edges. Collective.
   Real surprise(const Stage& stage, const FreeSurface& surface);
   void measure_forces();

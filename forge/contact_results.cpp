@@ -8,6 +8,8 @@ namespace {
 /// Limits of friction have settled where they change by less than this share of all friction.
 constexpr Real settled_friction = 1e-3;
 constexpr int most_friction_passes = 6;
+/// Passes after which points may lose friction but gain none, so that the set of rubbing points settles.
+constexpr int most_free_passes = 4;
 
 }  // namespace
 
@@ -83,8 +85,25 @@ bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface
     for (ContactMemory& memory : memory_) memory.multiplier = memory.pressure;
     again = true;
   }
+  again = update_rubbing(pass) || again;
   if (has_limited_friction() && pass < most_friction_passes) again = update_friction(surface) || again;
   return again;
+}
+
+/// Points that hold rub, others do not. A point that keeps changing its mind stays without friction.
+bool ContactFlow::update_rubbing(int pass) {
+  std::array<Real, 2> areas = {0, 0};  // of changed points, of all that hold
+  for (std::size_t i = 0; i < tractions_.size(); ++i) {
+    ContactPoint& point = contact_.points()[i];
+    const bool holds = tractions_[i].pressure > 0;
+    if (holds) areas[1] += point.area;
+    if (!(point.friction.scale > 0) || holds == point.rubs) continue;
+    if (pass >= most_free_passes && holds) continue;
+    point.rubs = holds;
+    areas[0] += point.area;
+  }
+  scene_.comm->sum_in_place(areas);
+  return areas[0] > 0;
 }
 
 bool ContactFlow::update_friction(const FreeSurface& surface) {

@@ -48,6 +48,7 @@ ContactPoint make_point(const ContactScene& scene, std::size_t place, int oppone
   point.normal.penalty = scene.settings.penalty * body.viscosity / body.edge;
   const ContactMemory* memory = recall(scene, point.slave, opponent, meeting.normal);
   point.normal.multiplier = memory != nullptr ? memory->multiplier : 0;
+  point.rubs = memory != nullptr || point.normal.offset - meeting.normal.dot(meeting.guessed_slip) > 0;
   return point;
 }
 

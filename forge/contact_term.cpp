@@ -49,13 +49,13 @@ Vector ContactTerm::slip(const ContactPoint& point, const NodeSpace& space, std:
 
 void ContactTerm::add_residual(const NodeSpace& space, std::span<const Real> unknowns, std::span<Real> force) const {
   for (const ContactPoint& point : points_) {
-    const ContactTraction traction = contact_traction(point.normal, point.friction, slip(point, space, unknowns));
-    if (traction.pressure == 0) continue;
+    const ContactTraction at = traction(point, slip(point, space, unknowns));
+    if (!acts(point, at)) continue;
     const Participants all = participants(point, space);
     for (std::size_t i = 0; i < static_cast<std::size_t>(all.count); ++i) {
-      const auto at = static_cast<std::size_t>(all.nodes[i]) * static_cast<std::size_t>(dim_);
+      const auto first = static_cast<std::size_t>(all.nodes[i]) * static_cast<std::size_t>(dim_);
       for (std::size_t c = 0; c < static_cast<std::size_t>(dim_); ++c) {
-        force[at + c] -= all.parts[i] * point.area * traction.traction[static_cast<Eigen::Index>(c)];
+        force[first + c] -= all.parts[i] * point.area * at.traction[static_cast<Eigen::Index>(c)];
       }
     }
   }
@@ -63,8 +63,8 @@ void ContactTerm::add_residual(const NodeSpace& space, std::span<const Real> unk
 
 void ContactTerm::add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const {
   for (const ContactPoint& point : points_) {
-    const ContactTraction traction = contact_traction(point.normal, point.friction, slip(point, space, unknowns));
-    if (traction.pressure == 0) continue;
+    const ContactTraction at = traction(point, slip(point, space, unknowns));
+    if (!acts(point, at)) continue;
     const Participants all = participants(point, space);
     for (std::size_t i = 0; i < static_cast<std::size_t>(all.count); ++i) {
       for (std::size_t j = 0; j < static_cast<std::size_t>(all.count); ++j) {
@@ -73,7 +73,7 @@ void ContactTerm::add_tangent(const NodeSpace& space, std::span<const Real> unkn
         std::array<Real, 9> block{};
         for (int row = 0; row < dim_; ++row) {
           for (int column = 0; column < dim_; ++column) {
-            block[static_cast<std::size_t>(row * dim_ + column)] = factor * traction.derivative(row, column);
+            block[static_cast<std::size_t>(row * dim_ + column)] = factor * at.derivative(row, column);
           }
         }
         sink.add(all.nodes[i], all.nodes[j], block.data());

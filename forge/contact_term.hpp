@@ -15,7 +15,8 @@ struct ContactPoint {
   int opponent = 0;            ///< tools first, then pairs of bodies
   Real area = 0;               ///< m^2 (m in plane strain): weight of the tractions
   NormalTerm normal;
-  FrictionTerm friction;
+  FrictionTerm friction;                           ///< what it is where the point rubs
+  bool rubs = false;                               ///< friction acts in this solve
   Vector opponent_velocity = Vector::Zero();       ///< of a rigid opponent there, m/s
   std::array<GlobalId, 3> masters = {-1, -1, -1};  ///< nodes of a deformable opponent's facet; -1: none
   std::array<Real, 3> weights = {0, 0, 0};
@@ -35,10 +36,18 @@ class ContactTerm final : public ResidualTerm {
   void add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const override;
   bool is_linear() const override { return false; }
 
+  /// The traction on the slave at a slip.
+  static ContactTraction traction(const ContactPoint& point, const Vector& slip) {
+    return contact_traction(point.normal, point.rubs ? point.friction : FrictionTerm{}, slip);
+  }
   /// Slave's velocity less the opponent's at the contact point, m/s. unknowns as in add_residual().
   Vector slip(const ContactPoint& point, const NodeSpace& space, std::span<const Real> unknowns) const;
 
  private:
+  bool acts(const ContactPoint& point, const ContactTraction& traction) const {
+    return point.rubs || traction.pressure > 0;
+  }
+
   int dim_;
   std::vector<ContactPoint> points_;
 };

@@ -20,13 +20,12 @@ FrictionTerm friction_term(const FrictionSpec& spec, Real consistency, Real shea
 ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip) {
   ContactTraction result;
   const Vector& n = normal.normal;
-  result.pressure = normal.multiplier + normal.penalty * (normal.offset - n.dot(slip));
-  if (!(result.pressure > 0)) {
-    result.pressure = 0;
-    return result;
+  const Real pressure = normal.multiplier + normal.penalty * (normal.offset - n.dot(slip));
+  if (pressure > 0) {
+    result.pressure = pressure;
+    result.traction = pressure * n;
+    result.derivative = -normal.penalty * n * n.transpose();
   }
-  result.traction = result.pressure * n;
-  result.derivative = -normal.penalty * n * n.transpose();
   if (!(friction.scale > 0)) return result;
   const Vector tangential = slip - n.dot(slip) * n;
   const Real square = tangential.squaredNorm() + friction.regularisation * friction.regularisation;

@@ -47,7 +47,8 @@ struct ContactTraction {
   Real pressure = 0;                   ///< Pa, >= 0
 };
 
-/// slip: dv = slave's velocity - velocity of the other side there [m/s]. Without pressure there is no friction.
+/// slip: dv = slave's velocity - velocity of the other side there [m/s]. Friction acts whatever the pressure is: who
+/// solves says which points rub, and looks again after the solve. Else the traction would jump where contact begins.
 ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip);
 
 }  // namespace malleus::forge
