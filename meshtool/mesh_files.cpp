@@ -62,7 +62,6 @@ void refuse_unknown_ending(const std::string& path) {
 
 Mesh read_mesh(const Communicator& comm, const std::string& path, Real length_unit, FieldStore& fields) {
   refuse_unknown_ending(path);
-  if (is_medit(path)) return build_mesh(comm, read_medit_mesh(comm, path, length_unit));
   return load_mesh(comm, path, length_unit, fields);
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.hpp"
+#include "mesh/medit_mesh.hpp"
 #include "mesh/msh_reader.hpp"
 #include "partition/balance.hpp"
 #include "storage/mesh_file.hpp"
@@ -12,13 +13,17 @@ namespace malleus {
 Mesh load_mesh(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields) {
   const std::string ending = path.extension().string();
   if (ending == ".msh") return build_mesh(comm, read_msh(comm, path.string(), length_unit));
+  if (ending == ".mesh" || ending == ".meshb") {
+    return build_mesh(comm, read_medit_mesh(comm, path.string(), length_unit));
+  }
   if (ending == ".h5") {
     Mesh mesh = read_mesh_file(comm, path, length_unit, fields);
     balance_along_curve(comm, mesh, fields);
     return mesh;
   }
-  throw InputError(fmt::format("{}: meshes are read from .msh and .h5 files (meshtool convert makes them from others)",
-                               path.string()));
+  throw InputError(
+      fmt::format("{}: meshes are read from .msh, .h5, .mesh and .meshb files (meshtool convert makes them from CAD)",
+                  path.string()));
 }
 
 }  // namespace malleus

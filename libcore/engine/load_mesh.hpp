@@ -9,9 +9,9 @@
 
 namespace malleus {
 
-/// Reads .msh (gmsh 2.2, 4.1) or .h5 (our own), scaled by length_unit [m per unit of the file], in equal shares. The
-/// fields of a file of our own come declared in the store. InputError where the ending is unknown, or the file absent
-/// or damaged. Collective.
+/// Reads .msh (gmsh 2.2, 4.1), .mesh or .meshb (Medit) or .h5 (our own), scaled by length_unit [m per unit of the
+/// file], in equal shares. The fields of a file of our own come declared in the store. InputError where the ending is
+/// unknown, or the file absent or damaged. Collective.
 Mesh load_mesh(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields);
 
 }  // namespace malleus
