@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "fem/level_set_volume.hpp"
+#include "fem/pressure_extension.hpp"
 #include "mesh/space_filling_curve.hpp"
 
 namespace malleus::inject {
@@ -54,6 +55,7 @@ FieldUse Flow::uses() const {
 void Flow::rebuild() {
   operator_ = std::make_unique<StokesOperator>(scene_.comm, scene_.mesh, scene_.geometry);
   operator_->set_viscosity(mixture_);
+  operator_->leave_out_still_elements(true);
   linear_.reset();
   unknowns_ = {};
   is_solved_ = false;
@@ -227,6 +229,7 @@ void Flow::publish(const std::vector<GateDrive>& drives, const FlowConditions& c
     std::copy_n(unknowns_.nodes.data() + node * (dim + 1), dim, velocity.data() + node * dim);
     pressure[node] = unknowns_.nodes[node * (dim + 1) + dim];
   }
+  extend_pressure(scene_.comm, scene_.mesh, operator_->viscosity(), pressure);
   const std::span<Real> viscosity = scene_.fields["viscosity"].values();
   const std::span<Real> strain_rate = scene_.fields["strain_rate"].values();
   operator_->update_viscosity(unknowns_);

@@ -88,6 +88,7 @@ StokesOperator::StokesOperator(const Communicator& comm, const Mesh& mesh, Geome
 
 void StokesOperator::prepare() {
   compute_volumes();
+  find_still_elements();
   fix_unmodelled_nodes();
   NodeTuples tuples;
   for (const ResidualTerm* term : terms_) term->extra_couplings(tuples);
@@ -202,6 +203,29 @@ void StokesOperator::compute_volumes() {
   length_ = std::pow(mean, 1.0 / mesh_->dim);
 }
 
+void StokesOperator::find_still_elements() {
+  still_.clear();
+  if (!leaves_out_still_) return;
+  const int dim = mesh_->dim;
+  const auto is_at_rest = [&](LocalId node) {
+    std::array<Real, 3> velocity = {1, 1, 1};
+    constraints_.impose(node, velocity.data());
+    return constraints_.fixed_directions(node) == dim &&
+           std::all_of(velocity.begin(), velocity.begin() + dim, [](Real v) { return v == 0; });
+  };
+  for (LocalId e = 0; e < mesh_->elements(); ++e) {
+    const auto nodes = mesh_->nodes_of_element(e);
+    if (std::all_of(nodes.begin(), nodes.end(), is_at_rest)) still_.push_back(e);
+  }
+}
+
+void StokesOperator::leave_out_still() {
+  for (const LocalId e : still_) {
+    viscosity_[static_cast<std::size_t>(e)] = 0;
+    slope_[static_cast<std::size_t>(e)] = 0;
+  }
+}
+
 void StokesOperator::fix_unmodelled_nodes() {
   check(model_ != nullptr, "the operator has a viscosity");
   update_viscosity(1.0);  // any rate tells what is modelled
@@ -287,11 +311,13 @@ void StokesOperator::update_viscosity(const StokesState& state) {
     }
   });
   model_->evaluate(*mesh_, shear_rate_, viscosity_, slope_);
+  leave_out_still();
 }
 
 void StokesOperator::update_viscosity(Real uniform_shear_rate) {
   std::fill(shear_rate_.begin(), shear_rate_.end(), uniform_shear_rate);
   model_->evaluate(*mesh_, shear_rate_, viscosity_, slope_);
+  leave_out_still();
 }
 
 bool StokesOperator::is_linear() const {

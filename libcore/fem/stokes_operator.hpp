@@ -76,6 +76,11 @@ class StokesOperator {
   void set_loads(StokesLoads loads) { loads_ = std::move(loads); }
   void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
   void set_terms(std::vector<const ResidualTerm*> terms) { terms_ = std::move(terms); }
+  /// Whether elements all of whose nodes are held at rest leave the equations, as if they had no viscosity: nothing
+  /// flows there, and their pressure, which the bubbles alone determine, would cost iterations and mean nothing
+  /// (sections one element thin). Their other pressures can be filled in by extend_pressure(). Default: they stay.
+  void leave_out_still_elements(bool leave_out) { leaves_out_still_ = leave_out; }
+
   /// To be called when constraints, loads, gates, terms or coordinates were set or changed: volumes, couplings,
   /// halo of the constraints; finds whether anything fixes the mean pressure. Elements of zero viscosity are left
   /// out, nodes that only they have are fixed at rest (or as the constraints say). Collective.
@@ -134,6 +139,8 @@ class StokesOperator {
   };
 
   void compute_volumes();
+  void find_still_elements();
+  void leave_out_still();
   void fix_unmodelled_nodes();
   void choose_scale();
   void find_pressure_null();
@@ -162,6 +169,9 @@ class StokesOperator {
   std::vector<FluxGate> gates_;
   std::vector<const ResidualTerm*> terms_;
   bool pressure_is_free_ = false;
+
+  bool leaves_out_still_ = false;
+  std::vector<LocalId> still_;  ///< elements that leave the equations
 
   NodeTuples tuples_;
   std::unique_ptr<NodeSpace> space_;

@@ -10,6 +10,14 @@ namespace malleus {
 namespace {
 
 constexpr int baseline_restart = 100;
+constexpr int long_restart = 150;  // slivers and contrast make outliers, which shorter cycles meet again and again
+constexpr int short_restart = 40;
+constexpr LocalId long_restart_nodes = 200'000;  // a rank: beyond, 150 vectors would outweigh the matrix
+
+int automatic_restart(const LinearSystem& system) {
+  const auto largest = system.comm->max(static_cast<GlobalId>(system.mesh->owned_nodes()));
+  return largest <= long_restart_nodes ? long_restart : short_restart;
+}
 constexpr int baseline_iterations = 20;  ///< times those allowed to our own method
 
 /// A preconditioner of K alone for the methods that need no more: ILU(0) of each rank's rows, or MUMPS.
@@ -106,7 +114,9 @@ KrylovProblem::Run KrylovProblem::run(LinearMethod method, Real tolerance, const
   petsc_call(KSPCreate(operator_.system().comm->raw(), ksp.out()));
   petsc_call(MatSetNullSpace(operator_.matrix(), operator_.null_space()));
   petsc_call(KSPSetOperators(ksp.get(), operator_.matrix(), operator_.matrix()));
-  choose_type(ksp.get(), method, tolerance, options);
+  LinearSolverOptions chosen = options;
+  if (chosen.restart <= 0) chosen.restart = automatic_restart(operator_.system());
+  choose_type(ksp.get(), method, tolerance, chosen);
   PC pc = nullptr;
   petsc_call(KSPGetPC(ksp.get(), &pc));
   std::optional<KernelPreconditioner> kernel;

@@ -23,7 +23,7 @@ enum class LinearMethod {
 struct LinearSolverOptions {
   LinearMethod method = LinearMethod::block_triangular;
   PreconditionerSettings preconditioner;
-  int restart = 40;               ///< Krylov vectors between restarts, >= 2; 150 in the fallbacks
+  int restart = 0;                ///< Krylov vectors between restarts; 0 = 150 up to 200,000 nodes a rank, else 40
   int max_iterations = 300;       ///< of each step of the fallback chain; 20 times as many for the baselines
   bool reuse_setup = true;        ///< keep a hierarchy for later systems until the iterations grow
   bool fall_back = true;          ///< try stronger settings where a solve fails
@@ -48,7 +48,7 @@ struct LinearOutcome {
 ///   -malleus_method block_triangular | gamg | gmres_ilu | conjugate_residual | direct
 ///   -malleus_modes automatic | translations | rigid
 ///   -malleus_precision automatic | single | double
-///   -malleus_threshold <strong couplings, 0.15>  -malleus_chebyshev_steps <3>  -malleus_restart <40>
+///   -malleus_threshold <strong couplings, 0.15>  -malleus_chebyshev_steps <3>  -malleus_restart <150 or 40>
 /// The choices made are said in the log's details, fallbacks as warnings.
 class StokesLinearSolver {
  public:

@@ -34,7 +34,7 @@ void invert_diagonals_of(MultigridLevel& level) {
   for (LocalId row = 0; row < level.graph.rows(); ++row) {
     const Block<B> diagonal = ConstBlockView<B>(level.values.at(level.graph.diagonals[index(row)]));
     BlockView<B> inverse(level.inverses.data() + index(row) * B * B);
-    inverse = level.has_rotations ? pseudo_inverse<B>(diagonal) : Block<B>(diagonal.inverse());
+    inverse = pseudo_inverse<B>(diagonal);  // nodes that move along a gate's normal alone make a singular coarse block
   }
 }
 

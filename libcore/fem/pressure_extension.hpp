@@ -1,0 +1,17 @@
+#pragma once
+
+/// Pressures where nothing is modelled, for what is looked at.
+
+#include <span>
+
+#include "mesh/mesh.hpp"
+
+namespace malleus {
+
+/// Gives the nodes that touch no modelled element (viscosity > 0) the mean of their nearest neighbours that do, layer
+/// by layer, at most 64 layers; nodes beyond keep their values. element_viscosity: [element]. pressure: [node], owned
+/// and copies up to date, as on return. Collective.
+void extend_pressure(const Communicator& comm, const Mesh& mesh, std::span<const Real> element_viscosity,
+                     std::span<Real> pressure);
+
+}  // namespace malleus
