@@ -46,7 +46,7 @@ void read_database(LinearSolverOptions& options) {
   read_choice("-malleus_modes", modes, options.preconditioner.modes);
   read_choice("-malleus_precision", precisions, options.preconditioner.precision);
   read_integer("-malleus_chebyshev_steps", 1, options.preconditioner.chebyshev_steps);
-  read_integer("-malleus_restart", 2, options.restart);
+  read_integer("-malleus_restart", 0, options.restart);
   PetscReal threshold = options.preconditioner.threshold;
   petsc_call(PetscOptionsGetReal(nullptr, nullptr, "-malleus_threshold", &threshold, nullptr));
   if (!(threshold >= 0 && threshold < 1)) {
