@@ -24,6 +24,9 @@ class ForgeProcess final : public Process {
   std::vector<std::string> output_fields() const override;
   Real largest_step() override;
   std::optional<std::string> finished() override;
+  Real progress() override {
+    return case_.time.stroke && *case_.time.stroke > 0 ? leading_stroke().value_or(0) / *case_.time.stroke : 0;
+  }
   void refresh_outputs() override;
   std::vector<std::string> history_columns() const override;
   std::vector<HistoryCell> history_row() override;

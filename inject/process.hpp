@@ -35,6 +35,7 @@ class FillingProcess final : public Process {
   std::vector<std::string> output_fields() const override;
   Real largest_step() override;
   std::optional<std::string> finished() override;
+  Real progress() override { return filling_ ? state_.filled / scene_.cavity : 0; }
   std::vector<std::string> history_columns() const override;
   std::vector<HistoryCell> history_row() override;
   Real volume() const override { return scene_.cavity; }

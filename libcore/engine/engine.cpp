@@ -269,7 +269,7 @@ void Engine::print_increment(const Increment& increment) {
   const Real done = std::isfinite(settings_.end) ? increment.time / settings_.end : 0;
   const Real by_count =
       settings_.increments ? Real(increment.number) / Real(std::max<GlobalId>(*settings_.increments, 1)) : 0;
-  const Real share = std::clamp(std::max(done, by_count), 0.0, 1.0);
+  const Real share = std::clamp(std::max({done, by_count, process_.progress()}), 0.0, 1.0);
   const std::string eta = share > 0 ? report::duration(wall_s() * (1 - share) / share) : "-";
   log::info("{:6} | t {:.5g} s | dt {:.3g} s | {} | {:.1f} s | {:.0f} % | left {}", increment.number, increment.time,
             increment.dt, process_.increment_note(), wall_s(), 100 * share, eta);

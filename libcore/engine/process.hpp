@@ -58,6 +58,8 @@ class Process {
   virtual Real largest_step() = 0;
   /// Why the run is over after the increments so far, if it is: "stroke reached", "cavity full".
   virtual std::optional<std::string> finished() = 0;
+  /// How much of the way to that end is done, 0..1; 0 where nothing tells. For the time left in the log.
+  virtual Real progress() { return 0; }
   /// Brings fields that are only looked at (quality, stress) up to date before an output.
   virtual void refresh_outputs() {}
 
