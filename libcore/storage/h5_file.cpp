@@ -31,6 +31,16 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
+/// Creation properties without times of day, so that the same values give the same bytes.
+class TimelessProperties {
+ public:
+  explicit TimelessProperties(hid_t of) : list_(H5Pcreate(of), H5Pclose) { H5Pset_obj_track_times(list_.get(), false); }
+  hid_t get() const { return list_.get(); }
+
+ private:
+  Handle list_;
+};
+
 template <class T>
 hid_t memory_type();
 template <>
@@ -75,7 +85,8 @@ void H5File::fail(const std::string& what) const {
 }
 
 void H5File::make_group(const std::string& path) {
-  const Handle group(H5Gcreate2(file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  const TimelessProperties timeless(H5P_GROUP_CREATE);
+  const Handle group(H5Gcreate2(file_, path.c_str(), H5P_DEFAULT, timeless.get(), H5P_DEFAULT), H5Gclose);
   if (!group.is_open()) fail("group " + path + " cannot be created");
 }
 
@@ -83,10 +94,12 @@ template <class T>
 void H5File::write_dataset(const std::string& path, std::span<const T> values, const std::vector<std::uint64_t>& dims) {
   const auto count = std::accumulate(dims.begin(), dims.end(), std::uint64_t{1}, std::multiplies<>());
   check(count == values.size(), "the shape of a dataset fits its values");
+  const TimelessProperties timeless(H5P_DATASET_CREATE);
   const std::vector<hsize_t> shape(dims.begin(), dims.end());
   const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
   const Handle set(
-      H5Dcreate2(file_, path.c_str(), memory_type<T>(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+      H5Dcreate2(file_, path.c_str(), memory_type<T>(), space.get(), H5P_DEFAULT, timeless.get(), H5P_DEFAULT),
+      H5Dclose);
   if (!set.is_open()) fail("dataset " + path + " cannot be created");
   if (count > 0 && H5Dwrite(set.get(), memory_type<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail("dataset " + path + " cannot be written (is the disk full?)");
@@ -107,10 +120,11 @@ void H5File::write(const std::string& path, std::span<const std::int64_t> values
 }
 
 void H5File::write_text(const std::string& path, const std::string& text) {
+  const TimelessProperties timeless(H5P_DATASET_CREATE);
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.get(), std::max<std::size_t>(text.size(), 1));
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle set(H5Dcreate2(file_, path.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+  const Handle set(H5Dcreate2(file_, path.c_str(), type.get(), space.get(), H5P_DEFAULT, timeless.get(), H5P_DEFAULT),
                    H5Dclose);
   const std::string padded = text.empty() ? std::string(1, '\0') : text;
   if (!set.is_open() || H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0) {

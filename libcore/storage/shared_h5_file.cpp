@@ -8,6 +8,13 @@
 namespace malleus {
 namespace {
 
+/// Creation properties without times of day, so that the same values give the same bytes.
+hid_t timeless(hid_t of) {
+  const hid_t list = H5Pcreate(of);
+  H5Pset_obj_track_times(list, false);
+  return list;
+}
+
 hid_t file_type(SharedH5File::Type type) {
   switch (type) {
     case SharedH5File::Type::float64:
@@ -40,7 +47,9 @@ void SharedH5File::fail(const std::string& what) const {
 }
 
 void SharedH5File::make_group(const std::string& path) {
-  const hid_t group = H5Gcreate2(file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t properties = timeless(H5P_GROUP_CREATE);
+  const hid_t group = H5Gcreate2(file_, path.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT);
+  H5Pclose(properties);
   if (group < 0) fail("group " + path + " cannot be created");
   H5Gclose(group);
 }
@@ -48,7 +57,9 @@ void SharedH5File::make_group(const std::string& path) {
 void SharedH5File::make_dataset(const std::string& path, Type type, const std::vector<std::uint64_t>& dims) {
   const std::vector<hsize_t> shape(dims.begin(), dims.end());
   const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
-  const hid_t set = H5Dcreate2(file_, path.c_str(), file_type(type), space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t properties = timeless(H5P_DATASET_CREATE);
+  const hid_t set = H5Dcreate2(file_, path.c_str(), file_type(type), space, H5P_DEFAULT, properties, H5P_DEFAULT);
+  H5Pclose(properties);
   H5Sclose(space);
   if (set < 0) fail("dataset " + path + " cannot be created");
   H5Dclose(set);
