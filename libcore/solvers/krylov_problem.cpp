@@ -72,7 +72,11 @@ void choose_type(KSP ksp, LinearMethod method, Real tolerance, const LinearSolve
       iterations *= baseline_iterations;
       break;
   }
-  if (method != LinearMethod::conjugate_residual) petsc_call(KSPGMRESSetRestart(ksp, restart));
+  if (method != LinearMethod::conjugate_residual) {
+    petsc_call(KSPGMRESSetRestart(ksp, restart));
+    // With contrast the basis loses its orthogonality, and the residual of the recurrence falls below the true one.
+    petsc_call(KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED));
+  }
   constexpr Real margin = 0.95;  // between the recurrence's residual and the true one
   petsc_call(KSPSetTolerances(ksp, margin * tolerance, 0.0, PETSC_DEFAULT, iterations));
 }
