@@ -247,6 +247,7 @@ Outcome Engine::try_increment(const Increment& increment) {
 
 void Engine::record(const Increment& increment) {
   const Mesh& mesh = process_.mesh();
+  const GlobalId iterations = process_.linear_totals().iterations;
   std::vector<HistoryCell> row = {static_cast<Real>(increment.number),
                                   increment.time,
                                   increment.dt,
@@ -254,8 +255,9 @@ void Engine::record(const Increment& increment) {
                                   static_cast<Real>(mesh.total_elements),
                                   static_cast<Real>(comm_.size()),
                                   process_.volume(),
-                                  static_cast<Real>(process_.linear_totals().iterations),
+                                  static_cast<Real>(iterations - recorded_iterations_),
                                   std::round(wall_s() * 1e3) / 1e3};
+  recorded_iterations_ = iterations;
   for (const HistoryCell& cell : process_.history_row()) row.push_back(cell);
   timed("history", [&] { history_->append(row); });
   if (Probes* probes = process_.probes()) {

@@ -91,6 +91,7 @@ class Engine {
   Real next_dt_limit_ = std::numeric_limits<Real>::infinity();  ///< after a cut step
   GlobalId first_increment_ = 0;                                ///< of this leg
   GlobalId last_output_ = -1;
+  GlobalId recorded_iterations_ = 0;  ///< of the linear solver, up to the last row of the history
   GlobalId last_checkpoint_ = 0;
   Real last_checkpoint_wall_ = 0;
   Real longest_checkpoint_s_ = 0;

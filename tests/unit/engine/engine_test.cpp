@@ -58,7 +58,8 @@ class DecayProcess : public Process {
   std::vector<HistoryCell> history_row() override { return {y()}; }
   Real volume() const override { return 1; }
   std::string increment_note() const override { return ""; }
-  LinearTotals linear_totals() const override { return {}; }
+  /// As if each step took two linear solves of five iterations.
+  LinearTotals linear_totals() const override { return {.solves = 2 * decay.calls, .iterations = 10 * decay.calls}; }
   nlohmann::json accuracy() override { return nlohmann::json::object(); }
   nlohmann::json save_state() const override { return {{"calls", decay.calls}}; }
   void restore(Mesh&& mesh, std::vector<SavedField>&& fields, const nlohmann::json& state) override {
@@ -112,6 +113,13 @@ TEST_F(EngineRun, MeetsTheEndInEqualSteps) {
   EXPECT_EQ(history().size(), 11U);
   EXPECT_EQ(summary().at("status"), "done");
   EXPECT_NEAR(summary().at("final").at("time_s").get<Real>(), 1.0, 1e-14);
+}
+
+TEST_F(EngineRun, ARowOfTheHistoryHasTheIterationsOfItsIncrement) {
+  DecayProcess process;
+  run(process);
+  EXPECT_EQ(summary().at("final").at("linear_iterations").get<Real>(), 10);
+  EXPECT_EQ(summary().at("linear").at("iterations").get<int>(), 100);
 }
 
 TEST_F(EngineRun, AStepThatDoesNotDivideTheEndIsShortened) {
