@@ -258,6 +258,8 @@ void build_scene(const Communicator& comm, Mesh mesh, const ForgeCase& forge_cas
   scene.progress.boundary_strokes.assign(scene.boundaries->settings().size(), 0.0);
   scene.progress.body_strokes.assign(scene.bodies.size(), 0.0);
   scene.progress.volume_targets.assign(scene.bodies.size(), 0.0);
+  scene.progress.asked_strains.assign(scene.bodies.size(), 0.0);
+  scene.progress.volume_losses.assign(scene.bodies.size(), 0.0);
 }
 
 }  // namespace malleus::forge

@@ -65,6 +65,7 @@ void ContactFlow::save() {
   saved_.presses.clear();
   for (const Tool& tool : scene_.tools) saved_.presses.push_back(tool.press().state());
   saved_.targets = scene_.progress.volume_targets;
+  saved_.asked = scene_.progress.asked_strains;
   saved_.report = report_;
   saved_.edge_rate = edge_rate_;
   saved_.strain_rate = strain_rate_;
@@ -77,6 +78,7 @@ void ContactFlow::roll_back() {
   memory_ = saved_.memory;
   for (std::size_t t = 0; t < scene_.tools.size(); ++t) scene_.tools[t].press().restore(saved_.presses[t]);
   scene_.progress.volume_targets = saved_.targets;
+  scene_.progress.asked_strains = saved_.asked;
   report_ = saved_.report;
   edge_rate_ = saved_.edge_rate;
   strain_rate_ = saved_.strain_rate;
@@ -199,14 +201,28 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
       return Outcome::done();
     }
     prepare_operator(stage);
+    if (search == 0) start_softly();
     for (int pass = 0;; ++pass) {
-      if (const Outcome outcome = run_newton(); outcome.kind != Outcome::Kind::done) return outcome;
+      if (const Outcome outcome = run_newton(scene_.solver.newton_tolerance); outcome.kind != Outcome::Kind::done)
+        return outcome;
       if (!update_contacts(stage, surface, pass)) break;
       if (pass == most_passes) return Outcome::retry("the contact pressures did not settle");
     }
     if (surprise(stage, surface) <= tolerated_surprise) return Outcome::done();
   }
   return Outcome::retry("nodes end within a tool");
+}
+
+/// From rest, which points hold is found with a penalty a hundred times softer and a loose tolerance first.
+void ContactFlow::start_softly() {
+  if (!has_contacts_ || scene_.comm->any(!memory_.empty())) return;
+  constexpr Real softening = 1e-2;
+  constexpr Real loose = 1e-2;
+  const std::vector<ContactPoint> points = contact_.points();
+  for (ContactPoint& point : contact_.points()) point.normal.penalty *= softening;
+  const std::vector<Real> start = state_.nodes;
+  if (run_newton(loose).kind != Outcome::Kind::done) state_.nodes = start;
+  contact_.points() = points;
 }
 
 Vector ContactFlow::velocity_of(LocalId node) const {
@@ -290,31 +306,49 @@ void ContactFlow::prepare_operator(const Stage& stage) {
   operator_->impose_constraints(state_);
 }
 
-/// Asks each body's lost volume back: the displacement of the increment shall have div = ln(V0 / V).
+/// Asks each body's lost volume back: the displacement of the increment shall have the volume strain ln(V0 / V), and
+/// besides what this increment is expected to lose by the last one's measure (the schemes' error of third order).
 void ContactFlow::volume_targets(const Displacement& way, StokesLoads& loads) {
   const bool by_scheme = scene_.motion.scheme != TimeScheme::euler;
   const VolumeTarget choice = scene_.motion.volume_target;
   if (choice == VolumeTarget::no || (choice == VolumeTarget::automatic && !by_scheme)) return;
+  Progress& progress = scene_.progress;
+  const Real ratio = progress.last_step > 0 ? way.step / progress.last_step : 0;
   std::vector<Real> targets;
   for (std::size_t region = 0; region < scene_.bodies.size(); ++region) {
     const Body& body = scene_.bodies[region];
     Real target = 0;
     if (body.is_deformable() && body.volume > 0) {
-      const Real asked = std::log(body.start_volume / body.volume) / way.step;
-      target = (asked - way.before * saved_.targets[region]) / way.now;
+      const Real expected = progress.volume_losses[region] * ratio * ratio * ratio;
+      progress.asked_strains[region] = std::log(body.start_volume / body.volume) - expected;
+      target = (progress.asked_strains[region] / way.step - way.before * saved_.targets[region]) / way.now;
     }
     targets.push_back(target);
   }
-  scene_.progress.volume_targets = targets;
+  progress.volume_targets = targets;
   for (const std::int32_t region : scene_.mesh.element_region) {
     loads.element_divergence.push_back(targets[static_cast<std::size_t>(region)]);
   }
 }
 
-Outcome ContactFlow::run_newton() {
+/// The Newton loop; where a linear solve hits the floor of rounding (stiff penalties, sharp tolerances) again with
+/// looser ones, for it is the nonlinear residual that decides.
+Outcome ContactFlow::run_newton(Real tolerance) {
+  Outcome outcome = Outcome::done();
+  Real linear_tolerance = scene_.solver.linear_tolerance;
+  for (int attempt = 0; attempt < 3; ++attempt, linear_tolerance = std::min(1e2 * linear_tolerance, 1e-2)) {
+    const NewtonOutcome newton = run_newton_once(tolerance, linear_tolerance);
+    if (newton.converged) return Outcome::done();
+    outcome = Outcome::retry(newton.reason);
+    if (newton.reason.find("linear solver") == std::string::npos) break;
+  }
+  return outcome;
+}
+
+NewtonOutcome ContactFlow::run_newton_once(Real tolerance, Real linear_tolerance) {
   NewtonOptions options;
-  options.tolerance = scene_.solver.newton_tolerance;
-  options.linear_tolerance = scene_.solver.linear_tolerance;
+  options.tolerance = tolerance;
+  options.linear_tolerance = linear_tolerance;
   options.max_iterations = scene_.solver.max_newton;
   options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
   const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
@@ -329,7 +363,7 @@ Outcome ContactFlow::run_newton() {
     log::debug("  {} residual {:.2e} step {:.2g}, {} linear iterations", iteration.newton ? "newton" : "picard",
                iteration.residual, iteration.step, iteration.linear_iterations);
   }
-  return outcome.converged ? Outcome::done() : Outcome::retry(outcome.reason);
+  return outcome;
 }
 
 Real ContactFlow::time_to_touch(Real time) {

@@ -74,6 +74,7 @@ class ContactFlow final : public Component {
     std::vector<ContactMemory> memory;
     std::vector<PressState> presses;
     std::vector<Real> targets;
+    std::vector<Real> asked;
     FlowReport report;
     Real edge_rate = 0;
     Real strain_rate = 0;
@@ -91,7 +92,9 @@ class ContactFlow final : public Component {
   bool is_pushed(Real time) const;
   void rest();
   void prepare_operator(const Stage& stage);
-  Outcome run_newton();
+  void start_softly();
+  Outcome run_newton(Real tolerance);
+  NewtonOutcome run_newton_once(Real tolerance, Real linear_tolerance);
   void volume_targets(const Displacement& displacement, StokesLoads& loads);
 
   /// Slips of the contact points at the solution, and from them pressures, gaps and what is remembered. Whether the

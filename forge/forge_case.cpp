@@ -102,7 +102,7 @@ void PenaltySettings::describe(Section& s) {
          "1/c, above 1e9 they grow again")
       .at_least(1)
       .at_most(1e9)
-      .by_level(1e3, 1e4, 1e4, 1e5);
+      .by_level(1e3, 1e4, 1e4, 1e4);
   s.flag("augmented", augmented, "augmented Lagrangian: solves again until the penetration is below `penetration`")
       .by_level(false, false, true, true);
   s.real("penetration", penetration, "", "penetration in a step that augmentation accepts, as a share of an edge")

@@ -293,6 +293,7 @@ nlohmann::json ForgeProcess::save_state() const {
                           {"boundary_strokes", progress.boundary_strokes},
                           {"body_strokes", progress.body_strokes},
                           {"volume_targets", progress.volume_targets},
+                          {"volume_losses", progress.volume_losses},
                           {"max_penetration", max_penetration_},
                           {"max_imbalance", max_imbalance_},
                           {"newton_total", newton_total_},
@@ -319,6 +320,7 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   progress.boundary_strokes = state.at("boundary_strokes").get<std::vector<Real>>();
   progress.body_strokes = state.at("body_strokes").get<std::vector<Real>>();
   progress.volume_targets = state.at("volume_targets").get<std::vector<Real>>();
+  progress.volume_losses = state.at("volume_losses").get<std::vector<Real>>();
   max_penetration_ = state.at("max_penetration");
   max_imbalance_ = state.at("max_imbalance");
   newton_total_ = state.at("newton_total");

@@ -99,13 +99,14 @@ void Motion::integrate_strain(Real dt) {
 /// What the motion lost beyond what was asked back: the drift that there were without volume targets.
 void Motion::account_volume() {
   const std::vector<Real> volumes = body_volumes(scene_);
+  Progress& progress = scene_.progress;
   Real change = 0;
   Real start = 0;
   for (std::size_t region = 0; region < scene_.bodies.size(); ++region) {
     Body& body = scene_.bodies[region];
-    if (body.is_deformable()) {
-      const bool asked = scene_.progress.volume_targets[region] != 0;
-      change += volumes[region] - body.volume - (asked ? body.volume * std::log(body.start_volume / body.volume) : 0);
+    if (body.is_deformable() && body.volume > 0) {
+      progress.volume_losses[region] = std::log(volumes[region] / body.volume) - progress.asked_strains[region];
+      change += body.volume * progress.volume_losses[region];
       start += body.start_volume;
     }
     body.volume = volumes[region];

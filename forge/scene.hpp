@@ -42,6 +42,8 @@ struct Progress {
   std::vector<Real> boundary_strokes;  ///< [boundary] m
   std::vector<Real> body_strokes;      ///< [region] m
   std::vector<Real> volume_targets;    ///< [region] div v asked for in the last increment, 1/s
+  std::vector<Real> asked_strains;     ///< [region] volume strain asked for in the last increment
+  std::vector<Real> volume_losses;     ///< [region] volume strain of the last increment less what was asked
 };
 
 /// The mesh stays at its place in memory through the run.

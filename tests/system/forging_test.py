@@ -134,9 +134,9 @@ class Upsetting(Forging):
     def test_the_volume_target_holds_the_volume(self):
         box_mesh(self.directory / "box.msh", 2, cells=(2, 2))
         rows = self.forge(case_text(0.3, 2, 1, "boundaries", time="increments = 8\nstep = 0.05"))
-        self.assertLess(abs(rows[-1]["volume_change"]), 2e-4)
+        self.assertLess(abs(rows[-1]["volume_change"]), 4e-4)
         raw = summary(self.directory / "out")["accuracy"]["raw_volume_drift"]
-        self.assertGreater(abs(raw), 2 * abs(rows[-1]["volume_change"]))
+        self.assertGreater(abs(raw), 5 * abs(rows[-1]["volume_change"]))
 
     def test_ranks_agree_and_runs_repeat(self):
         box_mesh(self.directory / "box.msh", 3, cells=(3, 3, 3))
@@ -188,8 +188,8 @@ class Contact(Forging):
             velocity = " ".join(repr(speed) if a == 1 else "free" for a in range(dim))
             text += f"[boundary.{name}]\ngroup = {group}\nvelocity = {velocity}\n"
         return text + ("[contact.middle]\nslave = upper\nmaster = lower\n"
-                       "[solver]\nnewton_tolerance = 1e-6\nlinear_tolerance = 1e-9\ncutoff_strain_rate = 1e-6\n"
-                       "[penalty]\npenalty = 1e5\n")
+                       "[solver]\nnewton_tolerance = 1e-6\nlinear_tolerance = 1e-8\ncutoff_strain_rate = 1e-6\n"
+                       "[penalty]\npenalty = 1e4\naugmented = yes\npenetration = 1e-8\n")
 
     def test_block_on_block_is_one_block(self):
         # Nodes against facets without friction do not pass the patch test exactly where meshes do not match:
@@ -259,7 +259,7 @@ class Presses(Forging):
         if "stroke_file" in keys:
             text = text.replace("velocity = 0 -1.0\n", "")
         return self.forge(text, "-D", "solver.newton_tolerance=1e-6", "-D", "solver.linear_tolerance=1e-9",
-                          "-D", "solver.cutoff_strain_rate=1e-4", "-D", "penalty.penalty=1e5")
+                          "-D", "solver.cutoff_strain_rate=1e-4", "-D", "penalty.augmented=yes")
 
     def test_the_hydraulic_press_keeps_its_force(self):
         # F = 2 K (2w)^m / H^(1+m) constant: dH/dt = -w, w = (F/2K)^(1/m) H^((1+m)/m) / 2
