@@ -59,7 +59,9 @@ Answer flow_through(const Passage& passage) {
   op.set_gates(std::move(gates));
   op.prepare();
   StokesState state = op.start_state();
-  StokesLinearSolver linear;
+  LinearSolverOptions direct;
+  direct.method = LinearMethod::direct;
+  StokesLinearSolver linear(direct);
   Answer answer;
   answer.outcome =
       NewtonSolver({.tolerance = 1e-8, .linear_tolerance = 1e-9, .start_shear_rate = 1}).solve(op, linear, state);

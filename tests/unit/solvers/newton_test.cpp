@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "fem/boundary_conditions.hpp"
 #include "support/box_mesh.hpp"
@@ -13,6 +14,13 @@ namespace {
 
 using test::box_mesh;
 using test::world;
+
+/// These systems are small, and Newton's method is the subject.
+LinearSolverOptions direct_solves() {
+  LinearSolverOptions options;
+  options.method = LinearMethod::direct;
+  return options;
+}
 
 /// Upsetting of the unit box along `axis`, frictionless: top at speed -1, three planes of symmetry.
 NodeConstraints upsetting(const Mesh& mesh, int axis) {
@@ -48,7 +56,7 @@ Upset upset(int dim, int axis, Real sensitivity) {
   op.set_constraints(upsetting(mesh, axis));
   op.prepare();
   StokesState state = op.start_state();
-  StokesLinearSolver linear;
+  StokesLinearSolver linear(direct_solves());
   Upset result;
   result.outcome =
       NewtonSolver({.tolerance = 1e-8, .linear_tolerance = 1e-10, .start_shear_rate = rate}).solve(op, linear, state);
@@ -103,8 +111,72 @@ struct Sticking {
   Mesh mesh;
   std::unique_ptr<RegionViscosity> model;
   StokesOperator op;
-  StokesLinearSolver linear;
+  StokesLinearSolver linear{direct_solves()};
 };
+
+TEST(Newton, FrictionlessUpsettingOfARevolvedDiscIsExact) {
+  for (const Real m : {1.0, 0.3}) {
+    const Mesh mesh = box_mesh(world(), {.dim = 2, .cells = {5, 4, 1}, .jitter = 0.2});
+    std::vector<std::unique_ptr<const ViscousLaw>> laws;
+    laws.push_back(std::make_unique<NortonHoffLaw>(NortonHoff{2, m, 1e-6}));
+    const RegionViscosity model(std::move(laws));
+    std::vector<BoundaryCondition> conditions(2);
+    conditions[0] = {mesh.find_group("y_low"), ConditionKind::symmetry, {}};
+    conditions[1] = {mesh.find_group("y_high"), ConditionKind::velocity, {std::nullopt, Expression(-1), std::nullopt}};
+    StokesOperator op(world(), mesh, Geometry::axisymmetric);
+    op.set_viscosity(model);
+    op.set_constraints(make_constraints(world(), mesh, Geometry::axisymmetric, conditions, 0));
+    op.prepare();
+    StokesState state = op.start_state();
+    StokesLinearSolver linear(direct_solves());
+    const NewtonOutcome outcome =
+        NewtonSolver({.tolerance = 1e-8, .linear_tolerance = 1e-10, .start_shear_rate = 1}).solve(op, linear, state);
+    ASSERT_TRUE(outcome.converged) << outcome.reason;
+    const std::vector<Real> reactions = op.reactions(state);
+    Real force = 0;
+    for (LocalId node = 0; node < mesh.owned_nodes(); ++node) {
+      if (mesh.point(node)[1] > 1 - 1e-9) force -= reactions[static_cast<std::size_t>(2 * node + 1)];
+    }
+    const Real exact = std::numbers::pi * std::sqrt(3.0) * 2 * std::pow(std::sqrt(3.0), m);
+    EXPECT_NEAR(world().sum(force) / exact, 1, 1e-7);
+  }
+}
+
+/// Half of the box is not modelled; in the other half, free to slide on three sides, div v = 0.3 is demanded.
+TEST(Newton, VolumeTargetsAndRegionsThatAreNotModelled) {
+  const Mesh mesh = box_mesh(world(), {.dim = 2, .cells = {8, 4, 1}});
+  std::vector<Real> viscosity;
+  StokesLoads loads;
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    Real x = 0;
+    for (const LocalId node : mesh.nodes_of_element(e)) x += mesh.point(node)[0] / 3;
+    viscosity.push_back(x < 0.5 ? 4 : 0);
+    loads.element_divergence.push_back(0.3);
+  }
+  const GivenViscosity model(viscosity);
+  std::vector<BoundaryCondition> conditions;
+  for (const char* name : {"x_low", "y_low", "y_high"}) {
+    conditions.push_back({mesh.find_group(name), ConditionKind::symmetry, {}});
+  }
+  StokesOperator op(world(), mesh, Geometry::plane);
+  op.set_viscosity(model);
+  op.set_constraints(make_constraints(world(), mesh, Geometry::plane, conditions, 0));
+  op.set_loads(std::move(loads));
+  op.prepare();
+  EXPECT_FALSE(op.pressure_is_free());  // the cut at x = 0.5 is a free surface
+  StokesState state = op.start_state();
+  StokesLinearSolver linear(direct_solves());
+  const NewtonOutcome outcome = NewtonSolver({.linear_tolerance = 1e-11}).solve(op, linear, state);
+  ASSERT_TRUE(outcome.converged) << outcome.reason;
+  for (LocalId node = 0; node < mesh.nodes(); ++node) {
+    const Real x = mesh.point(node)[0];
+    const Real* values = state.nodes.data() + static_cast<std::size_t>(node) * 3;
+    EXPECT_NEAR(values[0], x < 0.5 + 1e-9 ? 0.3 * x : 0, 1e-9);
+    EXPECT_NEAR(values[1], 0, 1e-9);
+    // sigma_xx = 2 eta 0.3 - p = 0 at the free surface
+    EXPECT_NEAR(values[2], x < 0.5 + 1e-9 ? 2 * 4 * 0.3 : 0, 1e-8);
+  }
+}
 
 TEST(Newton, ConvergesFromAColdStartAtAnySensitivity) {
   const std::array<std::pair<Real, int>, 5> limits = {{{0.5, 8}, {0.3, 12}, {0.1, 15}, {0.05, 20}, {0.02, 20}}};
