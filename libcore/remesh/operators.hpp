@@ -15,6 +15,7 @@ struct Limits {
   Real nearest_ring = 0.45;  ///< a split puts no point nearer to the vertices around the edge
   Real split_key = 0.02;     ///< a split leaves no element below this and below a share of the present worst
   Real collapse_key = 0.08;  ///< likewise for a collapse
+  Real balance_key = 0.25;   ///< a turn for balance leaves no element below this
   Real swap_gain = 1.03;     ///< a swap multiplies the worst key by at least this
 };
 
@@ -51,6 +52,9 @@ class Operators {
   bool swap_face(LocalId element, std::size_t face);
   /// Any swap at an element.
   bool swap_at(LocalId element);
+  /// Turns an edge (2D) where that brings the numbers of triangles at its four vertices nearer to the ideal, at some
+  /// expense of shape that relocation makes good.
+  bool balance(LocalId element, std::size_t edge);
   /// Moves a vertex where its elements become better.
   bool relocate(LocalId v);
 
@@ -74,6 +78,7 @@ class Operators {
   bool ball_stays_close(LocalId v) const;
   void move_curve_edges(LocalId v, LocalId w);
   bool swap_patch_edge(LocalId a, LocalId b, Real worst);
+  int surplus(LocalId v);
   bool edge_exists(LocalId a, LocalId b);
   std::size_t edge_of(LocalId e, LocalId a, LocalId b) const;
   Point<D> ideal_position(LocalId v) const;

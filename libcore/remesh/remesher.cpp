@@ -136,6 +136,16 @@ void Remesher<D, Metric>::swap_pass(Real key) {
   }
 }
 
+/// Turns edges towards six triangles at each vertex (three at the boundary).
+template <int D, class Metric>
+void Remesher<D, Metric>::balance_pass() {
+  for (std::size_t e = 0; e < mesh_.elements.size(); ++e) {
+    for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
+      if (mesh_.elements[e].is_live()) operators_.balance(static_cast<LocalId>(e), edge);
+    }
+  }
+}
+
 template <int D, class Metric>
 void Remesher<D, Metric>::move_pass() {
   std::vector<LocalId> list;
@@ -175,7 +185,8 @@ void Remesher<D, Metric>::improve() {
   for (int round = 0; round < options_.improvement_rounds; ++round) {
     enlist_all();
     const bool last = round + 1 == options_.improvement_rounds;
-    timed("swap", [&] { swap_pass(quality_to_key<D>(0.766)); });
+    if constexpr (D == 2) timed("balance", [&] { balance_pass(); });
+    timed("swap", [&] { swap_pass(quality_to_key<D>(D == 3 ? 0.8 : 0.95)); });
     timed("collapse", [&] { collapse_pass(0.5); });
     if (!last) timed("split", [&] { split_pass(operators_.limits.long_edge); });
     timed("move", [&] { move_pass(); });
@@ -197,28 +208,61 @@ void Remesher<D, Metric>::run(RemeshReport& report) {
   report.phases.insert(report.phases.end(), phases_.begin(), phases_.end());
 }
 
+namespace {
+
+/// Number of distinct edges, and of those whose metric length is in [1/sqrt 2, sqrt 2].
+template <int D, class Metric>
+std::pair<std::int64_t, std::int64_t> count_edges(const WorkingMesh<D, Metric>& mesh) {
+  // The upper ends of all elements' edges, gathered by lower end.
+  std::vector<LocalId> start(mesh.vertices.size() + 1, 0);
+  const auto each_edge = [&](auto&& visit) {
+    for (const auto& element : mesh.elements) {
+      if (!element.is_live()) continue;
+      for (const auto& [i, j] : EdgeTable<D>::nodes)
+        visit(std::min(element.node[i], element.node[j]), std::max(element.node[i], element.node[j]));
+    }
+  };
+  each_edge([&](LocalId low, LocalId) { ++start[static_cast<std::size_t>(low) + 1]; });
+  for (std::size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
+  std::vector<LocalId> upper(static_cast<std::size_t>(start.back()));
+  std::vector<LocalId> next(start.begin(), start.end() - 1);
+  each_edge([&](LocalId low, LocalId high) {
+    upper[static_cast<std::size_t>(next[static_cast<std::size_t>(low)]++)] = high;
+  });
+  std::vector<LocalId> seen(mesh.vertices.size(), -1);
+  std::int64_t all = 0;
+  std::int64_t good = 0;
+  for (std::size_t v = 0; v + 1 < start.size(); ++v) {
+    const auto low = static_cast<LocalId>(v);
+    for (LocalId n = start[v]; n < start[v + 1]; ++n) {
+      const LocalId high = upper[static_cast<std::size_t>(n)];
+      if (seen[static_cast<std::size_t>(high)] == low) continue;
+      seen[static_cast<std::size_t>(high)] = low;
+      const Real length = mesh.squared_length_of(low, high);
+      ++all;
+      good += length >= 0.5 && length <= 2.0 ? 1 : 0;
+    }
+  }
+  return {all, good};
+}
+
+}  // namespace
+
 template <int D, class Metric>
 RemeshQuality assess(const WorkingMesh<D, Metric>& mesh) {
   RemeshQuality quality;
   Real sum = 0;
   Real worst = 2;
-  std::vector<std::pair<std::uint64_t, bool>> edges;
   for (const auto& element : mesh.elements) {
     if (!element.is_live()) continue;
     worst = std::min<Real>(worst, element.key);
     sum += key_to_quality<D>(element.key);
     if (element.key <= 0) ++quality.inverted;
-    for (const auto& [a, b] : EdgeTable<D>::nodes) {
-      const Real length = mesh.squared_length_of(element.node[a], element.node[b]);
-      edges.emplace_back(edge_key(element.node[a], element.node[b]), length >= 0.5 && length <= 2.0);
-    }
   }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  const auto good = std::count_if(edges.begin(), edges.end(), [](const auto& edge) { return edge.second; });
+  const auto [all, good] = count_edges(mesh);
   quality.minimum = worst > 0 ? key_to_quality<D>(worst) : worst;
   quality.mean = mesh.count_elements() > 0 ? sum / mesh.count_elements() : 0;
-  quality.conforming = edges.empty() ? 1 : static_cast<Real>(good) / static_cast<Real>(edges.size());
+  quality.conforming = all == 0 ? 1 : static_cast<Real>(good) / static_cast<Real>(all);
   return quality;
 }
 

@@ -28,6 +28,7 @@ class Remesher {
   void split_pass(Real threshold);
   void collapse_pass(Real threshold);
   void swap_pass(Real key);
+  void balance_pass();
   void move_pass();
   bool collapse_shortest(LocalId element, Real threshold);
   void timed(const char* phase, const std::function<void()>& work);

@@ -103,6 +103,43 @@ bool Operators<D, Metric>::swap_edge(LocalId e, std::size_t edge) {
   return true;
 }
 
+/// Triangles at a vertex beyond the ideal number; 0 where there is none (corners).
+template <int D, class Metric>
+int Operators<D, Metric>::surplus(LocalId v) {
+  const int dimension = mesh_.vertex(v).dimension;
+  if (dimension == 0 || !cavity_.gather_ball(v)) return 0;
+  return static_cast<int>(cavity_.elements().size()) - (cavity_.is_closed() ? 6 : 3);
+}
+
+template <int D, class Metric>
+bool Operators<D, Metric>::balance(LocalId e, std::size_t edge) {
+  if constexpr (D == 3) return false;
+  const Element<D>& element = mesh_.element(e);
+  const auto [i, j] = EdgeTable<D>::nodes[edge];
+  const std::size_t face = 3 - i - j;
+  const FaceRef ref = element.neighbour[face];
+  if (ref == no_face || element_of(ref) < e || element.patch[face] != no_patch) return false;
+  const std::array<LocalId, 4> around = {element.node[i], element.node[j], element.node[face],
+                                         mesh_.element(element_of(ref)).node[local_face(ref)]};
+  int before = 0;
+  int after = 0;
+  for (std::size_t k = 0; k < around.size(); ++k) {
+    const int now = surplus(around[k]);
+    const int then = mesh_.vertex(around[k]).dimension == 0 ? 0 : now + (k < 2 ? -1 : 1);
+    before += now * now;
+    after += then * then;
+  }
+  if (after >= before) return false;
+  cavity_.gather_shell(e, edge);
+  cavity_.find_border();
+  const StarOf star = star_from(around[2]);
+  const Real limit = std::max(0.4 * cavity_.worst_key(), limits.balance_key);
+  if (cavity_.evaluate(star, limit) <= limit) return false;
+  commit(star);
+  ++counts.swaps;
+  return true;
+}
+
 template <int D, class Metric>
 bool Operators<D, Metric>::swap_face(LocalId e, std::size_t face) {
   if (mesh_.element(e).patch[face] != no_patch || !cavity_.gather_pair(e, face)) return false;

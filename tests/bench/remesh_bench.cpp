@@ -96,6 +96,7 @@ int run(int argc, char** argv) {
   app.add_option("output", output)->required();
   app.add_option("--size", size);
   app.add_option("--metric", metric_file);
+  app.add_option("--rounds", options.improvement_rounds);
   app.add_option("--hausdorff", options.hausdorff);
   app.add_flag("--keep-volume", options.keep_volume);
   app.add_flag("--keep-surface", options.keep_surface);
