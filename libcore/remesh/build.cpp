@@ -124,6 +124,7 @@ void build_elements(const RemeshMesh& input, WorkingMesh<D, Metric>& mesh, Build
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     mesh.vertices[v].dimension = D;
     mesh.vertices[v].frozen = !input.frozen.empty() && input.frozen[v] != 0;
+    mesh.vertices[v].fixed = mesh.vertices[v].frozen;
     if (mesh.vertices[v].element < 0) ++notes.unused_nodes;
   }
 }

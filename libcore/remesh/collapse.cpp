@@ -107,7 +107,7 @@ void Operators<D, Metric>::move_curve_edges(LocalId v, LocalId w) {
 template <int D, class Metric>
 bool Operators<D, Metric>::collapse(LocalId v, LocalId w) {
   const Vertex& vertex = mesh_.vertex(v);
-  if (vertex.frozen || vertex.dimension == 0 || vertex.dimension < mesh_.vertex(w).dimension) return false;
+  if (vertex.fixed || vertex.dimension == 0 || vertex.dimension < mesh_.vertex(w).dimension) return false;
   if (!cavity_.gather_ball(v)) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0 || makes_long_edge(v, w)) return false;

@@ -236,7 +236,7 @@ Real predicted_elements(const RemeshMesh& mesh, const Metric& metric) {
 }
 
 void scale_to_nodes(const RemeshMesh& mesh, Metric& metric, Real nodes) {
-  const Real elements_per_node = mesh.dimension == 2 ? 1.8 : 4.7;
+  const Real elements_per_node = mesh.dimension == 2 ? 1.9 : 4.6;
   const Real now = predicted_elements(mesh, metric) / elements_per_node;
   if (!(now > 0) || !(nodes > 0)) return;
   const Real factor = std::pow(now / nodes, 1.0 / mesh.dimension);  // on sizes

@@ -24,7 +24,7 @@ Metric intersect(const RemeshMesh& mesh, const Metric& a, const Metric& b);
 Real predicted_elements(const RemeshMesh& mesh, const Metric& metric);
 
 /// Scales all sizes by one factor such that a remesh should make about this many nodes: elements over nodes taken as 2
-/// in 2D and 4.7 in 3D, as measured on our own meshes (whose elements are a fifth smaller than regular unit ones).
+/// in 2D and 4.6 in 3D, as measured on our own meshes (whose elements are a fifth smaller than regular unit ones).
 void scale_to_nodes(const RemeshMesh& mesh, Metric& metric, Real nodes);
 
 /// The mesh's own sizes: at a node, the mean length of its edges [m].

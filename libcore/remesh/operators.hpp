@@ -9,14 +9,16 @@ namespace malleus::remeshing {
 
 /// What counts as too long, too short and too bad; lengths are metric, squared.
 struct Limits {
-  Real long_edge = 2.0;      ///< split above
-  Real short_edge = 0.5;     ///< collapse below
-  Real longest_made = 2.0;   ///< a collapse makes no edge above
-  Real nearest_ring = 0.45;  ///< a split puts no point nearer to the vertices around the edge
-  Real split_key = 0.02;     ///< a split leaves no element below this and below a share of the present worst
-  Real collapse_key = 0.08;  ///< likewise for a collapse
-  Real balance_key = 0.25;   ///< a turn for balance leaves no element below this
-  Real swap_gain = 1.03;     ///< a swap multiplies the worst key by at least this
+  Real long_edge = 2.0;        ///< split above
+  Real short_edge = 0.5;       ///< collapse below
+  Real longest_made = 2.0;     ///< a collapse makes no edge above
+  Real nearest_ring = 0.45;    ///< a split puts no point nearer to the vertices around the edge
+  Real split_key = 0.02;       ///< a split leaves no element below this and below a share of the present worst
+  Real collapse_key = 0.08;    ///< likewise for a collapse
+  float small_change = 0.02F;  ///< relative change of a key from which its element is looked at again
+  float large_change = 1e30F;  ///< and its vertices, too
+  Real balance_key = 0.25;     ///< a turn for balance leaves no element below this
+  Real swap_gain = 1.03;       ///< a swap multiplies the worst key by at least this
 };
 
 /// Accepted operations.
@@ -84,6 +86,7 @@ class Operators {
   Point<D> ideal_position(LocalId v) const;
   bool try_site(LocalId v, const Site<D, Metric>& site, Real worst, Real total);
   bool return_to_surface(LocalId v, Real worst);
+  void note_changes();
   template <class Accept>
   bool put_at(LocalId v, const Site<D, Metric>& site, Real floor, Accept&& accept);
   void commit(const StarOf& star);

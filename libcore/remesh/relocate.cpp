@@ -124,13 +124,32 @@ bool Operators<D, Metric>::put_at(LocalId v, const Site<D, Metric>& site, Real f
   }
   mesh_.vertex(v).input_element = site.input_element;
   mesh_.vertex(v).input_face = site.input_face;
-  for (std::size_t n = 0; n < elements.size(); ++n) mesh_.element(elements[n]).key = keys_[n];
+  note_changes();
   return true;
+}
+
+/// Takes over the new keys of the ball; elements and vertices whose surroundings changed enough to matter go on the
+/// lists.
+template <int D, class Metric>
+void Operators<D, Metric>::note_changes() {
+  const auto elements = cavity_.elements();
+  float largest = 0;
+  for (std::size_t n = 0; n < elements.size(); ++n) {
+    Element<D>& element = mesh_.element(elements[n]);
+    largest = std::max(largest, std::abs(keys_[n] - element.key) / std::max(element.key, 1e-6F));
+    element.key = keys_[n];
+  }
+  if (largest < limits.small_change) return;
+  for (const LocalId e : elements) {
+    enlist(e, pending::swap | pending::length);
+    if (largest < limits.large_change) continue;
+    for (const LocalId u : mesh_.element(e).node) enlist_vertex(u);
+  }
 }
 
 template <int D, class Metric>
 bool Operators<D, Metric>::relocate(LocalId v) {
-  if (mesh_.vertex(v).frozen || mesh_.vertex(v).dimension == 0 || !cavity_.gather_ball(v)) return false;
+  if (mesh_.vertex(v).fixed || mesh_.vertex(v).dimension == 0 || !cavity_.gather_ball(v)) return false;
   Real worst = 2;
   Real total = 0;
   for (const LocalId e : cavity_.elements()) {
@@ -139,7 +158,6 @@ bool Operators<D, Metric>::relocate(LocalId v) {
   }
   if (worst <= 0) return false;
   if (background_.is_on_curved(v) && return_to_surface(v, worst)) {
-    for (const LocalId e : cavity_.elements()) enlist(e, pending::swap | pending::length);
     enlist_vertex(v);
     ++counts.moves;
     return true;
@@ -151,7 +169,6 @@ bool Operators<D, Metric>::relocate(LocalId v) {
     const Site<D, Metric> site = background_.site_for(v, between<D>(from, wanted, step));
     if (!try_site(v, site, worst, total)) continue;
     ++counts.moves;
-    for (const LocalId e : cavity_.elements()) enlist(e, pending::swap | pending::length);
     return true;
   }
   return false;

@@ -28,6 +28,13 @@ void set_metrics(const Metric& metric, WorkingMesh<D, VertexMetric>& mesh) {
   }
 }
 
+/// Takes all patches with their vertices out of what may change.
+template <int D, class VertexMetric>
+void fix_surface(WorkingMesh<D, VertexMetric>& mesh) {
+  for (auto& patch : mesh.patches) patch.frozen = true;
+  for (auto& vertex : mesh.vertices) vertex.fixed = vertex.fixed || vertex.dimension < D;
+}
+
 template <int D, class VertexMetric>
 void set_keys(WorkingMesh<D, VertexMetric>& mesh) {
   for (auto& element : mesh.elements) element.key = static_cast<float>(mesh.key_of_element(element));
@@ -42,6 +49,7 @@ RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOp
   build_elements(input, mesh, notes);
   set_metrics(metric, mesh);
   classify(input, options.feature_angle * std::numbers::pi / 180, mesh, notes);
+  if (options.keep_surface) fix_surface(mesh);
   set_keys(mesh);
   report.nodes_before = input.nodes();
   report.elements_before = input.elements();

@@ -59,10 +59,18 @@ void Remesher<D, Metric>::enlist_all() {
   }
 }
 
+/// Renumbering pays once much of the mesh is out of order.
+template <int D, class Metric>
+void Remesher<D, Metric>::renumber_if_grown() {
+  const LocalId now = mesh_.count_elements();
+  if (now > 1.5 * ordered_elements_ || 1.5 * now < ordered_elements_) timed("renumber", [&] { renumber_all(); });
+}
+
 /// Renumbers, and makes the lists anew in the new order.
 template <int D, class Metric>
 void Remesher<D, Metric>::renumber_all() {
   renumber(mesh_);
+  ordered_elements_ = mesh_.count_elements();
   operators_.swap_list.clear();
   operators_.length_list.clear();
   operators_.move_list.clear();
@@ -102,13 +110,18 @@ void Remesher<D, Metric>::split_pass(Real threshold) {
   }
 }
 
+/// Collapses one of the element's edges below the threshold; edges refused before in this pass are not tried again.
 template <int D, class Metric>
-bool Remesher<D, Metric>::collapse_shortest(LocalId e, Real threshold) {
-  for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
-    const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
-    const LocalId b = mesh_.element(e).node[EdgeTable<D>::nodes[edge][1]];
+bool Remesher<D, Metric>::collapse_edges(LocalId e, Real threshold) {
+  for (const auto& [i, j] : EdgeTable<D>::nodes) {
+    const LocalId a = mesh_.element(e).node[i];
+    const LocalId b = mesh_.element(e).node[j];
     if (mesh_.squared_length_of(a, b) >= threshold) continue;
+    const std::uint64_t key = edge_key(a, b);
+    std::uint64_t& refused = refused_[static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 48)];
+    if (refused == key) continue;
     if (operators_.collapse(a, b) || operators_.collapse(b, a)) return true;
+    refused = key;
   }
   return false;
 }
@@ -117,11 +130,13 @@ template <int D, class Metric>
 void Remesher<D, Metric>::collapse_pass(Real threshold) {
   std::vector<LocalId> list;
   list.swap(operators_.length_list);
+  refused_.assign(std::size_t{1} << 16, 0);
   for (const LocalId e : list) {
     mesh_.element(e).waits = static_cast<std::uint8_t>(mesh_.element(e).waits & ~pending::length);
-    if (!mesh_.element(e).is_live() || collapse_shortest(e, threshold)) continue;
-    if (EdgeExtremes<D, Metric>(mesh_, mesh_.element(e)).longest > operators_.limits.long_edge)
-      operators_.enlist(e, pending::length);
+    if (!mesh_.element(e).is_live()) continue;
+    const EdgeExtremes<D, Metric> edges(mesh_, mesh_.element(e));
+    if (edges.shortest < threshold && collapse_edges(e, threshold)) continue;
+    if (edges.longest > operators_.limits.long_edge) operators_.enlist(e, pending::length);
   }
 }
 
@@ -164,30 +179,35 @@ void Remesher<D, Metric>::untangle() {
 
 template <int D, class Metric>
 void Remesher<D, Metric>::settle_sizes() {
+  constexpr int most_last_rounds = 8;
   const Limits& limits = operators_.limits;
-  for (int round = 0; round < options_.size_rounds; ++round) {
+  int last_rounds = 0;
+  for (int round = 0; round < options_.size_rounds && last_rounds < most_last_rounds; ++round) {
     const OperationCounts before = operators_.counts;
     const Real threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
     timed("split", [&] { split_pass(threshold); });
-    timed("collapse", [&] { collapse_pass(0.45); });
+    timed("collapse", [&] { collapse_pass(0.9 * limits.short_edge); });
     timed("swap", [&] { swap_pass(quality_to_key<D>(0.63)); });
     timed("move", [&] { move_pass(); });
     untangle();
-    timed("renumber", [&] { renumber_all(); });
+    renumber_if_grown();
+    if (threshold > limits.long_edge) continue;
+    ++last_rounds;
     const std::int64_t changes =
         operators_.counts.splits - before.splits + operators_.counts.collapses - before.collapses;
-    if (threshold <= limits.long_edge && changes <= mesh_.count_vertices() / 1000) break;
+    if (changes <= mesh_.count_vertices() / 200) break;
   }
 }
 
 template <int D, class Metric>
 void Remesher<D, Metric>::improve() {
+  operators_.limits.large_change = 0.05F;
+  enlist_all();
   for (int round = 0; round < options_.improvement_rounds; ++round) {
-    enlist_all();
     const bool last = round + 1 == options_.improvement_rounds;
-    if constexpr (D == 2) timed("balance", [&] { balance_pass(); });
+    if (D == 2 && round < 3) timed("balance", [&] { balance_pass(); });
     timed("swap", [&] { swap_pass(quality_to_key<D>(D == 3 ? 0.8 : 0.95)); });
-    timed("collapse", [&] { collapse_pass(0.5); });
+    timed("collapse", [&] { collapse_pass(operators_.limits.short_edge); });
     if (!last) timed("split", [&] { split_pass(operators_.limits.long_edge); });
     timed("move", [&] { move_pass(); });
     untangle();
@@ -196,6 +216,7 @@ void Remesher<D, Metric>::improve() {
 
 template <int D, class Metric>
 void Remesher<D, Metric>::run(RemeshReport& report) {
+  ordered_elements_ = mesh_.count_elements();
   untangle();
   enlist_all();
   settle_sizes();

@@ -30,14 +30,17 @@ class Remesher {
   void swap_pass(Real key);
   void balance_pass();
   void move_pass();
-  bool collapse_shortest(LocalId element, Real threshold);
+  bool collapse_edges(LocalId element, Real threshold);
+  void renumber_if_grown();
   void timed(const char* phase, const std::function<void()>& work);
 
   WorkingMesh<D, Metric>& mesh_;
   const RemeshOptions& options_;
   Operators<D, Metric> operators_;
   std::vector<RemeshPhase> phases_;
-  bool tangled_ = true;  ///< inverted elements may be left
+  std::vector<std::uint64_t> refused_;  ///< edges that could not be collapsed in this pass, by a hash
+  LocalId ordered_elements_ = 0;        ///< how many there were at the last renumbering
+  bool tangled_ = true;                 ///< inverted elements may be left
 };
 
 /// Quality of all elements and lengths of all edges.

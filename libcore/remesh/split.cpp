@@ -104,7 +104,7 @@ bool Operators<D, Metric>::split_at(StarOf star, EntityOf entity, LocalId a, Loc
   mesh_.metric(star.apex) = star.site.metric;
   Vertex& vertex = mesh_.vertex(star.apex);
   const bool waits = vertex.waits;
-  vertex = {-1, entity.id, star.site.input_element, star.site.input_face, entity.dimension, false, waits};
+  vertex = {-1, entity.id, star.site.input_element, star.site.input_face, entity.dimension, false, false, waits};
   if (D == 3 && entity.dimension == 1) {
     mesh_.curve_edges.erase(edge_key(a, b));
     mesh_.curve_edges.emplace(edge_key(a, star.apex), entity.id);
@@ -124,7 +124,7 @@ bool Operators<D, Metric>::split(LocalId e, std::size_t edge) {
   if (worst <= 0) return false;
   cavity_.find_border();
   const EntityOf entity = edge_entity(a, b);
-  if (entity.dimension < D && mesh_.vertex(a).frozen && mesh_.vertex(b).frozen) return false;
+  if (entity.dimension < D && mesh_.vertex(a).fixed && mesh_.vertex(b).fixed) return false;
   if (D == 3 && entity.dimension == 1 && mesh_.curves[static_cast<std::size_t>(entity.id)].locked) return false;
   StarOf star{-1, background_.site_on_edge(a, b, entity), a, b};
   if (is_near_ring(star) || cavity_.removes_frozen(star)) return false;

@@ -112,7 +112,7 @@ Point<D> Untangler<D, Metric>::raised(LocalId v, const Point<D>& start, Real mar
 template <int D, class Metric>
 bool Untangler<D, Metric>::relax(LocalId v) {
   const Vertex& vertex = mesh_.vertex(v);
-  if (vertex.element < 0 || vertex.frozen || vertex.dimension == 0 || !gather_heights(v)) return false;
+  if (vertex.element < 0 || vertex.fixed || vertex.dimension == 0 || !gather_heights(v)) return false;
   const Point<D> start = mesh_.point(v);
   const Measure before = measure(start);
   Real mean = 0;
@@ -271,7 +271,7 @@ template <int D, class Metric>
 bool Untangler<D, Metric>::try_balls(LocalId e) {
   const auto nodes = mesh_.element(e).node;
   for (const LocalId v : nodes) {
-    if (mesh_.vertex(v).dimension < D || mesh_.vertex(v).frozen) continue;
+    if (mesh_.vertex(v).dimension < D || mesh_.vertex(v).fixed) continue;
     if (!cavity_.gather_ball(v) || cavity_.elements().size() > largest_ball) continue;
     std::vector<LocalId> around;
     for (const LocalId other : cavity_.elements()) {
@@ -329,7 +329,7 @@ bool Untangler<D, Metric>::remove_loose(LocalId e) {
     if (f != base && element.patch[f] != patch) return false;
   }
   Vertex& loose = mesh_.vertex(element.node[base]);
-  if (!mesh_.patch(patch).flat || mesh_.patch(patch).frozen || loose.dimension != D - 1 || loose.frozen) return false;
+  if (!mesh_.patch(patch).flat || mesh_.patch(patch).frozen || loose.dimension != D - 1 || loose.fixed) return false;
   const FaceRef below = element.neighbour[base];
   mesh_.element(element_of(below)).neighbour[local_face(below)] = no_face;
   mesh_.element(element_of(below)).patch[local_face(below)] = patch;

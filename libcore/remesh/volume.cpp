@@ -46,7 +46,7 @@ void volume_gradients(const WorkingMesh<D, Metric>& mesh, const std::vector<Free
     }
     for (const LocalId v : face.node) {
       const Vertex& vertex = mesh.vertex(v);
-      if (vertex.dimension != D - 1 || vertex.frozen) continue;
+      if (vertex.dimension != D - 1 || vertex.fixed) continue;
       auto& gradient = gradients[static_cast<std::size_t>(v)];
       gradient = shifted<D>(gradient, inward, -1 / factorial<D>);
     }

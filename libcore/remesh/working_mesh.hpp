@@ -64,8 +64,9 @@ struct Vertex {
   LocalId input_element = -1;  ///< element of the input mesh near it
   LocalId input_face = -1;     ///< surface face or curve edge of the input mesh near it
   std::uint8_t dimension = 3;
-  bool frozen = false;
-  bool waits = false;  ///< on the list of vertices to relocate
+  bool frozen = false;  ///< on a parallel interface
+  bool fixed = false;   ///< may not move or vanish: frozen, or on a surface that is to be kept
+  bool waits = false;   ///< on the list of vertices to relocate
 };
 
 /// A connected piece of boundary or of an interface, bounded by feature edges.

@@ -133,6 +133,21 @@ TEST(Remesh, LeavesFrozenInterfacesAlone) {
   }
 }
 
+TEST(Remesh, KeepsTheSurfaceWhereAsked) {
+  for (const int dimension : {2, 3}) {
+    RemeshMesh mesh = box_mesh(dimension, 4);
+    test::group_sides(mesh);
+    const LocalId facets = mesh.facets();
+    RemeshOptions options;
+    options.keep_surface = true;
+    const RemeshReport report = remesh(mesh, Metric::uniform(0.1), options);
+    test::expect_sound(mesh);
+    EXPECT_EQ(mesh.facets(), facets);
+    EXPECT_TRUE(mesh.frozen.empty());
+    EXPECT_GT(report.splits, 0);
+  }
+}
+
 TEST(Remesh, RefusesWhatIsNoMesh) {
   RemeshMesh mesh = box_mesh(3, 1);
   mesh.element_nodes[0] = 99;
