@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/floating_point.hpp"
 #include "solvers/petsc_objects.hpp"
 
 namespace malleus {
@@ -79,6 +80,7 @@ class GamgVelocity final : public VelocityMultigrid {
     const PetscReal threshold = 0.01;
     petsc_call(PCGAMGSetThreshold(cycle_.get(), const_cast<PetscReal*>(&threshold), 1));
     petsc_call(PCSetFromOptions(cycle_.get()));
+    const TrapsOff traps_off;
     petsc_call(PCSetUp(cycle_.get()));
     PetscInt count = 0;
     petsc_call(PCMGGetLevels(cycle_.get(), &count));
@@ -89,6 +91,7 @@ class GamgVelocity final : public VelocityMultigrid {
   }
 
   void apply(const Real* residual, Real* correction) override {
+    const TrapsOff traps_off;
     petsc_call(VecPlaceArray(in_.get(), residual));
     petsc_call(VecPlaceArray(out_.get(), correction));
     petsc_call(PCApply(cycle_.get(), in_.get(), out_.get()));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/floating_point.hpp"
 #include "solvers/bordered_preconditioner.hpp"
 
 namespace malleus {
@@ -33,6 +34,7 @@ class KernelPreconditioner {
       petsc_call(PCSetType(pc_.get(), PCBJACOBI));
     }
     petsc_call(PCSetFromOptions(pc_.get()));
+    const TrapsOff traps_off;
     petsc_call(PCSetUp(pc_.get()));
   }
   PC get() const { return pc_.get(); }
@@ -51,6 +53,24 @@ class KernelPreconditioner {
   PetscPreconditioner pc_;
 };
 
+/// For methods that do not know their true residual: looks at it every few iterations.
+struct TrueResidualTest {
+  static constexpr PetscInt interval = 8;
+  Real target = 0;  ///< ||b - K x||
+
+  static PetscErrorCode judge(KSP ksp, PetscInt iteration, PetscReal norm, KSPConvergedReason* reason, void* context) {
+    *reason = std::isfinite(norm) ? KSP_CONVERGED_ITERATING : KSP_DIVERGED_NANORINF;
+    if (*reason != KSP_CONVERGED_ITERATING || iteration == 0 || iteration % interval != 0) return 0;
+    Vec residual = nullptr;
+    PetscReal size = 0;
+    PetscCall(KSPBuildResidual(ksp, nullptr, nullptr, &residual));
+    PetscCall(VecNorm(residual, NORM_2, &size));
+    PetscCall(VecDestroy(&residual));
+    if (size <= static_cast<TrueResidualTest*>(context)->target) *reason = KSP_CONVERGED_RTOL;
+    return 0;
+  }
+};
+
 void choose_type(KSP ksp, LinearMethod method, Real tolerance, const LinearSolverOptions& options) {
   int restart = options.restart;
   int iterations = options.max_iterations;
@@ -67,8 +87,7 @@ void choose_type(KSP ksp, LinearMethod method, Real tolerance, const LinearSolve
       iterations *= baseline_iterations;
       break;
     case LinearMethod::conjugate_residual:
-      petsc_call(KSPSetType(ksp, KSPCR));
-      petsc_call(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
+      petsc_call(KSPSetType(ksp, KSPMINRES));
       iterations *= baseline_iterations;
       break;
   }
@@ -131,6 +150,10 @@ KrylovProblem::Run KrylovProblem::run(LinearMethod method, Real tolerance, const
     use_bordered_preconditioner(pc, *bordered);
   } else {
     petsc_call(PCSetType(pc, stokes_preconditioner_type));
+  }
+  TrueResidualTest test{tolerance * size_};
+  if (method == LinearMethod::conjugate_residual) {
+    petsc_call(KSPSetConvergenceTest(ksp.get(), TrueResidualTest::judge, &test, nullptr));
   }
   petsc_call(KSPSetFromOptions(ksp.get()));
   PetscBool is_ours = PETSC_FALSE;

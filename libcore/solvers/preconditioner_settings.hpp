@@ -12,7 +12,7 @@ enum class VelocityMethod { multigrid, gamg };
 
 struct PreconditionerSettings {
   VelocityMethod velocity = VelocityMethod::multigrid;
-  CoarseModes modes = CoarseModes::automatic;            ///< automatic: rigid above a viscosity contrast of 100
+  CoarseModes modes = CoarseModes::automatic;            ///< automatic: rigid above a viscosity contrast of 30
   CyclePrecision precision = CyclePrecision::automatic;  ///< automatic: double above a contrast of 1e6
   Real threshold = 0.15;                                 ///< of strong couplings on the finest level
   int chebyshev_steps = 3;

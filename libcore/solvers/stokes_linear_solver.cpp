@@ -34,8 +34,9 @@ struct Step {
 
 /// Stronger and stronger settings, each once. Collective.
 std::vector<Step> make_chain(const LinearSolverOptions& options, const LinearSystem& system) {
-  PreconditionerSettings first = resolve(options.preconditioner, system);
+  PreconditionerSettings first = options.preconditioner;
   first.positive = options.method == LinearMethod::conjugate_residual;
+  first = resolve(first, system);
   PreconditionerSettings rigid = first;
   rigid.modes = CoarseModes::rigid;
   PreconditionerSettings rigid_double = rigid;

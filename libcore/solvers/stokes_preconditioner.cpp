@@ -12,7 +12,7 @@
 namespace malleus {
 namespace {
 
-constexpr Real rigid_contrast = 1e2;
+constexpr Real rigid_contrast = 30;
 constexpr Real double_contrast = 1e6;
 
 std::size_t index(LocalId i) {
@@ -56,8 +56,9 @@ PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSyst
     settings.modes = contrast > rigid_contrast ? CoarseModes::rigid : CoarseModes::translations;
   }
   if (settings.precision == CyclePrecision::automatic) {
-    settings.precision =
-        contrast > double_contrast ? CyclePrecision::double_precision : CyclePrecision::single_precision;
+    // Methods that rely on symmetry stall at 1e-6 with the rounding of a cycle in single precision.
+    const bool wants_double = settings.positive || contrast > double_contrast;
+    settings.precision = wants_double ? CyclePrecision::double_precision : CyclePrecision::single_precision;
   }
   return settings;
 }

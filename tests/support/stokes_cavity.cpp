@@ -82,7 +82,8 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   model_ = std::make_unique<GivenViscosity>(std::move(viscosity));
   equations_ = std::make_unique<StokesOperator>(comm, mesh_, Geometry::plane);
   equations_->set_viscosity(*model_);
-  equations_->set_constraints(wall_constraints(mesh_, options.is_open));
+  equations_->set_constraints(options.is_floating ? NodeConstraints(dim, mesh_.nodes())
+                                                  : wall_constraints(mesh_, options.is_open));
   equations_->set_loads(std::move(loads));
   equations_->prepare();
   StokesState state = equations_->start_state();

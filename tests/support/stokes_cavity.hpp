@@ -19,6 +19,7 @@ struct CavityOptions {
   Real inside = 1;              ///< viscosity in the spheres, Pa.s; 1 outside
   Real viscosity_scale = 1;     ///< of both
   std::vector<Sphere> spheres;  ///< discs in 2D
+  bool is_floating = false;     ///< nothing is fixed anywhere
   bool is_open = false;  ///< sides without traction, bottom fixed, top moving down at 1: an upsetting that sticks
 };
 
