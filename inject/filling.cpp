@@ -27,6 +27,8 @@ Outcome Filling::advance(const Increment& increment) {
   const Real entered = state_.inflow() * increment.dt;
   stands_still_ = entered > 0 && filled > 0.5 * scene_.cavity && gain < smallest_gain * entered;
   state_.filled = std::min(filled, scene_.cavity);
+  const bool has_vents = !scene_.settings.vents.empty();
+  state_.is_closed = has_vents && !fronts_.has_way_out();
   return Outcome::done();
 }
 
@@ -46,6 +48,10 @@ std::optional<std::string> Filling::finished() const {
   if (fronts_.size() == 0 || scene_.settings.inlets.empty()) return std::nullopt;
   const Real element = scene_.cavity / static_cast<Real>(std::max<GlobalId>(1, scene_.mesh.total_elements));
   if (fill_fraction() >= full || unfilled() < element) return "cavity full";
+  if (state_.is_closed) {
+    return fmt::format("short shot: the vents are covered, {:.4g} m^3 of what was in the cavity stay in it",
+                       unfilled());
+  }
   if (stands_still_) {
     return fmt::format("short shot: what enters leaves through the vents, {:.4g} m^3 stay unfilled", unfilled());
   }

@@ -28,6 +28,7 @@ struct FillingState {
   Real filled = 0;
   Real travelled = 0;         ///< elements that the front moved since the flow was solved
   bool flow_updated = false;  ///< in this increment
+  bool is_closed = false;     ///< every vent is sealed, and nothing else lets fluid out
   GlobalId flow_solves = 0;
   GlobalId increments_since_flow = 0;
   Real seconds_since_flow = 0;

@@ -106,7 +106,8 @@ bool Flow::is_due(const std::vector<GateDrive>& drives) {
   const FlowSettings& flow = scene_.settings.flow;
   if (fronts_.size() == 0 || flow.update.kind == FlowUpdate::Kind::once) return false;
   if (flow.update.kind == FlowUpdate::Kind::every) return state_.increments_since_flow > flow.update.every;
-  return state_.travelled >= nearly * flow.update_distance || dissipation_changed();
+  if (state_.travelled >= nearly * flow.update_distance || dissipation_changed()) return true;
+  return state_.travelled > 0 && fronts_.is_near_open_vent(flow.update_distance * scene_.element_size);
 }
 
 /// sum V |eta_new - eta_old| gamma^2 over sum V eta_new gamma^2, with the flow as it was.
@@ -131,9 +132,9 @@ void Flow::refresh_mixture() {
   mixture_.update(scene_.mesh, fronts_.level_sets());
 }
 
-/// A wall with `only = FLUID` holds the nodes that this fluid reaches.
+/// A wall with `only = FLUID` holds the nodes that this fluid reaches; a vent closes where a fluid has reached it.
 StickingNodes Flow::sticking_nodes() const {
-  StickingNodes sticks(static_cast<std::size_t>(scene_.mesh.nodes()), 0);
+  StickingNodes sticks = fronts_.sealed_vent_nodes();
   for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::wall)) {
     const int only = scene_.settings.fluid_index(scene_.settings.walls[part->index].only);
     if (only < 0) continue;
@@ -146,7 +147,7 @@ StickingNodes Flow::sticking_nodes() const {
         in_background = in_background && !inside;
         is_there = is_there || (inside && level_set.fluid == only);
       }
-      sticks[static_cast<std::size_t>(node)] = is_there || (in_background && only == mixture_.background());
+      if (is_there || (in_background && only == mixture_.background())) sticks[static_cast<std::size_t>(node)] = 1;
     }
   }
   return sticks;

@@ -260,17 +260,6 @@ void refuse_sealed(const Scene& scene, const std::vector<GateDrive>& drives, con
 
 }  // namespace
 
-std::vector<char> sticking_walls(const Scene& scene) {
-  std::vector<char> sticks(static_cast<std::size_t>(scene.mesh.nodes()), 0);
-  for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::wall)) {
-    if (scene.settings.walls[part->index].condition != WallSettings::Condition::no_slip) continue;
-    for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
-      if (part->normals->holds(node)) sticks[static_cast<std::size_t>(node)] = 1;
-    }
-  }
-  return sticks;
-}
-
 std::vector<GateDrive> asked_drives(const Scene& scene, Real time) {
   std::vector<GateDrive> drives(scene.settings.inlets.size());
   for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::inlet)) {

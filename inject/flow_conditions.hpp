@@ -40,7 +40,4 @@ FlowConditions make_conditions(const Scene& scene, const Mixture& mixture, const
 /// What each inlet asks for at that time. Collective.
 std::vector<GateDrive> asked_drives(const Scene& scene, Real time);
 
-/// Nodes of no-slip walls, those with `only = FLUID` among them: [node], alike on all holders.
-std::vector<char> sticking_walls(const Scene& scene);
-
 }  // namespace malleus::inject

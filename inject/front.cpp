@@ -15,6 +15,9 @@ namespace malleus::inject {
 namespace {
 
 constexpr Real not_filled = -1;
+/// Marks of facets through which the fluid's share of the flow is known: 0, 1, or none of it passes.
+constexpr signed char by_level_set = -1;
+constexpr signed char sealed = 2;
 
 /// Share of a facet in which a level set is positive.
 Real facet_share(const Mesh& mesh, LocalId facet, std::span<const Real> level_set) {
@@ -158,17 +161,23 @@ Outcome Front::substep(Real start, Real dt) {
 Front::Exchange Front::exchange(std::size_t front) const {
   const std::span<const Real> velocity = scene_.fields["velocity"].values();
   const std::span<const Real> level_set = std::as_const(fronts_).values(front);
-  std::vector<signed char> inlet_share(static_cast<std::size_t>(scene_.mesh.exterior_facets), -1);
+  std::vector<signed char> known_share(static_cast<std::size_t>(scene_.mesh.exterior_facets), by_level_set);
   for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
     const bool is_ours = scene_.settings.fluid_index(scene_.settings.inlets[part->index].fluid) == fronts_.fluid(front);
-    for (const LocalId f : part->facets) inlet_share[static_cast<std::size_t>(f)] = is_ours ? 1 : 0;
+    for (const LocalId f : part->facets) known_share[static_cast<std::size_t>(f)] = is_ours ? 1 : 0;
+  }
+  // What reaches a vent that it seals stays, though the flow has not been solved again yet.
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
+    if (fronts_.seals()[part->index] == 0) continue;
+    for (const LocalId f : part->facets) known_share[static_cast<std::size_t>(f)] = sealed;
   }
   std::array<Real, 2> sums = {0, 0};
   for (LocalId f = 0; f < scene_.mesh.exterior_facets; ++f) {
     const Real out = facet_outflow(scene_, f, velocity);
     if (out == 0) continue;
-    const signed char known = inlet_share[static_cast<std::size_t>(f)];
-    const Real share = known >= 0 && out < 0 ? known : facet_share(scene_.mesh, f, level_set);
+    const signed char known = known_share[static_cast<std::size_t>(f)];
+    if (known == sealed) continue;
+    const Real share = known != by_level_set && out < 0 ? known : facet_share(scene_.mesh, f, level_set);
     sums[out < 0 ? 0 : 1] += std::abs(out) * share;
   }
   scene_.comm.sum_in_place(sums);

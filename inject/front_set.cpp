@@ -17,6 +17,7 @@ FrontSet::FrontSet(Scene& scene) : scene_(scene) {
                                          : "level_set_" + settings.fluids[static_cast<std::size_t>(fluid)].name);
     scene.fields.declare(scene.mesh, {names_.back(), "m", Support::node, 1, Transfer::interpolate, false});
   }
+  seals_.assign(settings.vents.size(), 0);
 }
 
 std::vector<FluidLevelSet> FrontSet::level_sets() const {
@@ -51,6 +52,75 @@ std::vector<Real> FrontSet::behind_inlets(int fluid) const {
   return level_set;
 }
 
+bool FrontSet::is_filled(LocalId node) const {
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (values(i)[static_cast<std::size_t>(node)] > 0) return true;
+  }
+  return false;
+}
+
+void FrontSet::choose_seals() {
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
+    bool is_reached = false;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      is_reached = is_reached || (part->normals->holds(node) && is_filled(node));
+    }
+    is_reached = scene_.comm.any(is_reached);
+    const VentSettings::Seals wanted = scene_.settings.vents[part->index].seals;
+    seals_[part->index] =
+        wanted == VentSettings::Seals::yes || (wanted == VentSettings::Seals::automatic && !is_reached);
+  }
+}
+
+std::vector<char> FrontSet::sealed_vent_nodes() const {
+  const Mesh& mesh = scene_.mesh;
+  std::vector<Real> is_open(static_cast<std::size_t>(mesh.nodes()), 0);
+  std::vector<char> sealed(is_open.size(), 0);
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
+    for (LocalId node = 0; node < mesh.nodes(); ++node) {
+      if (seals_[part->index] != 0 && part->normals->holds(node)) sealed[static_cast<std::size_t>(node)] = 1;
+    }
+    for (const LocalId facet : part->facets) {
+      const auto nodes = mesh.nodes_of_facet(facet);
+      if (std::all_of(nodes.begin(), nodes.end(), [&](LocalId node) { return is_filled(node); })) continue;
+      for (const LocalId node : nodes) is_open[static_cast<std::size_t>(node)] = 1;
+    }
+  }
+  mesh.node_halo.max_to_owners(is_open, 1);
+  mesh.node_halo.update_copies(is_open, 1);
+  for (std::size_t n = 0; n < sealed.size(); ++n) {
+    if (is_open[n] > 0) sealed[n] = 0;
+  }
+  return sealed;
+}
+
+bool FrontSet::is_near_open_vent(Real distance) const {
+  bool is_near = false;
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
+    if (seals_[part->index] == 0) continue;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (!part->normals->holds(node) || is_filled(node)) continue;
+      for (std::size_t i = 0; i < size(); ++i) {
+        is_near = is_near || values(i)[static_cast<std::size_t>(node)] > -distance;
+      }
+    }
+  }
+  return scene_.comm.any(is_near);
+}
+
+bool FrontSet::has_way_out() const {
+  const std::vector<char> sealed = sealed_vent_nodes();
+  const std::vector<char> walls = sticking_walls(scene_);
+  bool is_open = false;
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      const auto n = static_cast<std::size_t>(node);
+      is_open = is_open || (part->normals->holds(node) && sealed[n] == 0 && walls[n] == 0);
+    }
+  }
+  return scene_.comm.any(is_open);
+}
+
 void FrontSet::set_initial() {
   for (std::size_t i = 0; i < size(); ++i) {
     const std::vector<Real> at_gate = behind_inlets(fluids_[i]);
@@ -65,6 +135,7 @@ void FrontSet::set_initial() {
       }
     }
   }
+  if (scene_.settings.time.increments != 0) choose_seals();
 }
 
 }  // namespace malleus::inject

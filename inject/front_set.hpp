@@ -22,16 +22,29 @@ class FrontSet {
   std::span<const Real> values(std::size_t i) const { return scene_.fields[names_[i]].values(); }
   std::vector<FluidLevelSet> level_sets() const;
   const std::vector<std::string>& names() const { return names_; }
+  const std::vector<char>& seals() const { return seals_; }  ///< [vent]: whether it closes where a fluid arrives
+  void set_seals(std::vector<char> seals) { seals_ = std::move(seals); }
+
+  /// Nodes of vents that a filling fluid has closed, in that it covers every facet of the vent at the node: [node],
+  /// alike on all holders. Collective.
+  std::vector<char> sealed_vent_nodes() const;
+  /// Whether a front is within a distance [m] of a part of a vent that it will close. Collective.
+  bool is_near_open_vent(Real distance) const;
+  /// Whether air, or a fluid under a given pressure, can still leave or enter. Collective.
+  bool has_way_out() const;
 
   /// Level sets at the start: the shapes of the case; else the front of a fluid stands at its inlets. Collective.
   void set_initial();
 
  private:
   std::vector<Real> behind_inlets(int fluid) const;
+  bool is_filled(LocalId node) const;
+  void choose_seals();
 
   Scene& scene_;
   std::vector<int> fluids_;
   std::vector<std::string> names_;
+  std::vector<char> seals_;  ///< [vent]
 };
 
 }  // namespace malleus::inject

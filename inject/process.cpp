@@ -115,6 +115,8 @@ Real FillingProcess::largest_step() {
   if (flow_ && flow.update.kind == FlowUpdate::Kind::every) stride = scene_.settings.front.cfl;
   if (flow_ && flow.update.kind == FlowUpdate::Kind::automatic) {
     stride = std::max(flow.update_distance, scene_.settings.front.cfl);
+    // A vent that closes changes the flow at once.
+    if (fronts_.is_near_open_vent(stride * scene_.element_size)) stride = scene_.settings.front.cfl;
   }
   const Real rate = front_->rate();
   Real dt = rate > 0 ? stride / rate : unlimited;
@@ -238,6 +240,7 @@ nlohmann::json FillingProcess::save_state() const {
                           {"left", state_.left},
                           {"filled", state_.filled},
                           {"travelled", state_.travelled},
+                          {"seals", fronts_.seals()},
                           {"flow_solves", state_.flow_solves},
                           {"increments_since_flow", state_.increments_since_flow},
                           {"seconds_since_flow", state_.seconds_since_flow}};
@@ -265,6 +268,7 @@ void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::
   state_.left = state.at("left");
   state_.filled = state.at("filled");
   state_.travelled = state.at("travelled");
+  fronts_.set_seals(state.at("seals").get<std::vector<char>>());
   state_.flow_solves = state.at("flow_solves");
   state_.increments_since_flow = state.at("increments_since_flow");
   state_.seconds_since_flow = state.at("seconds_since_flow");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include "base/error.hpp"
@@ -104,6 +105,10 @@ void Scene::rebuild() {
   graph = build_node_graph(mesh);
   measures = element_measures(mesh, geometry == Geometry::axisymmetric);
   cavity = comm.sum(std::accumulate(measures.begin(), measures.end(), 0.0));
+  const std::vector<Real> flat = element_measures(mesh, false);
+  const Real mean = comm.sum(std::accumulate(flat.begin(), flat.end(), 0.0)) /
+                    static_cast<Real>(std::max<GlobalId>(1, mesh.total_elements));
+  element_size = mesh.dim == 2 ? std::sqrt(4 / std::sqrt(3.0) * mean) : std::cbrt(6 * std::sqrt(2.0) * mean);
   parts = named_parts(settings);
   for (BoundaryPart& part : parts) part.group = mesh.find_group(group_of(settings, part));
   const std::vector<int> part_of_group = parts_of_groups(mesh, parts);
@@ -128,6 +133,17 @@ std::vector<const BoundaryPart*> Scene::parts_of(BoundaryPart::Kind kind) const 
 
 Real outflow(const Scene& scene, std::span<const LocalId> facets, std::span<const Real> velocity) {
   return boundary_flux(scene.comm, scene.mesh, scene.geometry, facets, velocity, scene.mesh.dim);
+}
+
+std::vector<char> sticking_walls(const Scene& scene) {
+  std::vector<char> sticks(static_cast<std::size_t>(scene.mesh.nodes()), 0);
+  for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::wall)) {
+    if (scene.settings.walls[part->index].condition != WallSettings::Condition::no_slip) continue;
+    for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+      if (part->normals->holds(node)) sticks[static_cast<std::size_t>(node)] = 1;
+    }
+  }
+  return sticks;
 }
 
 Real surface_mean(const Scene& scene, const BoundaryPart& part, std::span<const Real> field) {

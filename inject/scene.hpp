@@ -45,6 +45,7 @@ struct Scene {
   NodeGraph graph;
   std::vector<Real> measures;  ///< volume of each element, m^3
   Real cavity = 0;             ///< volume of all, m^3
+  Real element_size = 0;       ///< edge of a regular element of mean volume, m
   std::vector<BoundaryPart> parts;
 
   std::vector<const BoundaryPart*> parts_of(BoundaryPart::Kind kind) const;
@@ -52,6 +53,9 @@ struct Scene {
 
 /// Flow out through facets [m^3/s] of a velocity field [node][dim]. Collective.
 Real outflow(const Scene& scene, std::span<const LocalId> facets, std::span<const Real> velocity);
+
+/// Nodes of no-slip walls, those with `only = FLUID` among them: [node], alike on all holders.
+std::vector<char> sticking_walls(const Scene& scene);
 
 /// Mean of a nodal field over facets, weighted by area. Collective.
 Real surface_mean(const Scene& scene, const BoundaryPart& part, std::span<const Real> field);

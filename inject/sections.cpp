@@ -202,6 +202,10 @@ void VentSettings::describe(Section& s) {
       .starter("vent")
       .names_surface_group();
   s.expression("pressure", pressure, "Pa", "outside");
+  s.choice(
+      "seals", seals, {{"auto", Seals::automatic}, {"yes", Seals::yes}, {"no", Seals::no}},
+      "whether it lets out only what filled the cavity at the start, and closes where another fluid arrives; auto: "
+      "yes, unless another fluid is at it from the start");
 }
 
 void WallSettings::describe(Section& s) {

@@ -85,9 +85,12 @@ struct InletSettings {
 
 /// [vent.NAME]
 struct VentSettings {
+  enum class Seals { automatic, yes, no };
+
   std::string name;
   std::string group;
   Expression pressure = Expression(0);  ///< Pa
+  Seals seals = Seals::automatic;
 
   void describe(Section& s);
 };

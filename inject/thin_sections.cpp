@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/log.hpp"
-#include "inject/flow_conditions.hpp"
 
 namespace malleus::inject {
 namespace {
