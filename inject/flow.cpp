@@ -185,8 +185,7 @@ bool Flow::switch_over(std::vector<GateDrive>& drives) {
   return any;
 }
 
-NewtonOptions Flow::newton_options(const std::vector<GateDrive>& drives) const {
-  (void)drives;
+NewtonOptions Flow::newton_options() const {
   const SolverSettings& solver = scene_.settings.common.solver;
   NewtonOptions options;
   options.tolerance = solver.newton_tolerance;
@@ -196,16 +195,21 @@ NewtonOptions Flow::newton_options(const std::vector<GateDrive>& drives) const {
   return options;
 }
 
-Outcome Flow::solve_with(std::vector<GateDrive> drives, Real time) {
+std::vector<std::size_t> Flow::prepare(const std::vector<GateDrive>& drives, Real time) {
   FlowConditions conditions = make_conditions(scene_, mixture_, drives, sticking_nodes(), time);
   operator_->set_constraints(std::move(conditions.constraints));
   operator_->set_loads(std::move(conditions.loads));
-  operator_->set_gates(conditions.gates);
+  operator_->set_gates(std::move(conditions.gates));
   operator_->prepare();
   pressure_is_free_ = operator_->pressure_is_free();
+  return conditions.gate_inlets;
+}
+
+Outcome Flow::solve_with(const std::vector<GateDrive>& drives, Real time) {
+  const std::vector<std::size_t> gate_inlets = prepare(drives, time);
   StokesState unknowns = is_solved_ ? unknowns_ : operator_->start_state();
   operator_->impose_constraints(unknowns);
-  const NewtonOutcome newton = NewtonSolver(newton_options(drives)).solve(*operator_, linear_, unknowns);
+  const NewtonOutcome newton = NewtonSolver(newton_options()).solve(*operator_, linear_, unknowns);
   totals_.solves += newton.linear_solves;
   totals_.iterations += newton.linear_iterations;
   totals_.assembly_s += newton.assembly_seconds;
@@ -218,11 +222,11 @@ Outcome Flow::solve_with(std::vector<GateDrive> drives, Real time) {
   unknowns_ = std::move(unknowns);
   is_solved_ = true;
   ++state_.flow_solves;
-  publish(drives, conditions);
+  publish(drives, gate_inlets);
   return Outcome::done();
 }
 
-void Flow::publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions) {
+void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::size_t>& gate_inlets) {
   const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
   const std::span<Real> velocity = scene_.fields["velocity"].values();
   const std::span<Real> pressure = scene_.fields["pressure"].values();
@@ -245,8 +249,8 @@ void Flow::publish(const std::vector<GateDrive>& drives, const FlowConditions& c
     gate.pressure =
         gate.drive.kind == GateDrive::Kind::pressure ? gate.drive.value : surface_mean(scene_, *part, pressure);
   }
-  for (std::size_t g = 0; g < conditions.gate_inlets.size(); ++g) {
-    state_.gates[conditions.gate_inlets[g]].pressure = unknowns_.borders[g];
+  for (std::size_t g = 0; g < gate_inlets.size(); ++g) {
+    state_.gates[gate_inlets[g]].pressure = unknowns_.borders[g];
   }
 }
 
@@ -280,7 +284,7 @@ void Flow::note_freezing(std::span<const Real> old_velocity) {
 }
 
 nlohmann::json Flow::save() const {
-  return {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}, {"pressure_is_free", pressure_is_free_}};
+  return {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}};
 }
 
 void Flow::load(const nlohmann::json& saved) {
@@ -294,9 +298,11 @@ void Flow::load(const nlohmann::json& saved) {
     std::copy_n(velocity.data() + node * dim, dim, unknowns_.nodes.data() + node * (dim + 1));
     unknowns_.nodes[node * (dim + 1) + dim] = pressure[node];
   }
-  pressure_is_free_ = saved.at("pressure_is_free");
   is_solved_ = true;
   refresh_mixture();
+  std::vector<GateDrive> drives;
+  for (const GateState& gate : state_.gates) drives.push_back(gate.drive);
+  prepare(drives, state_.time);
   operator_->update_viscosity(unknowns_);
 }
 

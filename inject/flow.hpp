@@ -42,13 +42,15 @@ class Flow final : public Component {
   bool is_due(const std::vector<GateDrive>& drives);
   bool dissipation_changed();
   Outcome solve(Real time);
-  Outcome solve_with(std::vector<GateDrive> drives, Real time);
+  Outcome solve_with(const std::vector<GateDrive>& drives, Real time);
+  /// Makes the operator ready; returns the inlet of each flow-rate gate.
+  std::vector<std::size_t> prepare(const std::vector<GateDrive>& drives, Real time);
   bool switch_over(std::vector<GateDrive>& drives);
-  void publish(const std::vector<GateDrive>& drives, const FlowConditions& conditions);
+  void publish(const std::vector<GateDrive>& drives, const std::vector<std::size_t>& gate_inlets);
   void refresh_mixture();
   StickingNodes sticking_nodes() const;
   void note_freezing(std::span<const Real> old_velocity);
-  NewtonOptions newton_options(const std::vector<GateDrive>& drives) const;
+  NewtonOptions newton_options() const;
 
   Scene& scene_;
   Mixture& mixture_;
