@@ -82,7 +82,41 @@ StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const Pre
     multigrid.threshold = settings_.threshold;
     velocity_ = make_velocity_multigrid(*system.comm, std::move(finest), *system.constraints, multigrid);
   }
+  find_pockets(system);
   make_border_block();
+}
+
+void StokesPreconditioner::find_pockets(const LinearSystem& system) {
+  const SoftPockets pockets = find_soft_pockets(system);
+  open_regions_ = pockets.open;
+  if (pockets.count() == 0) return;
+  // A sphere in an unbounded fluid has 0.75 V/eta; anything from that to ten times as much serves.
+  constexpr Real factor = 1.5;
+  const Real scale = system.pressure_scale * system.pressure_scale * blocks_.scaling;
+  for (std::size_t k = 0; k < pockets.volume.size(); ++k) {
+    pocket_weights_.push_back(pockets.outside_viscosity[k] / (factor * scale * pockets.volume[k]));
+  }
+  pocket_of_node_.assign(index(blocks_.layout.size()), -1);
+  std::copy(pockets.of_node.begin(), pockets.of_node.end(), pocket_of_node_.begin());
+  blocks_.layout.halo.update_copies(std::span(pocket_of_node_), 1);
+}
+
+/// Adds the pockets' constants to the pressure's correction, copies included.
+void StokesPreconditioner::add_pockets(const Real* residual) {
+  if (pocket_weights_.empty()) return;
+  const auto dim = index(operator_->system().mesh->dim);
+  const Real sign = settings_.positive ? 1.0 : -1.0;
+  std::vector<Real> sums(pocket_weights_.size(), 0.0);
+  for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
+    const GlobalId pocket = pocket_of_node_[node];
+    if (pocket >= 0) sums[static_cast<std::size_t>(pocket)] += sign * residual[node * (dim + 1) + dim];
+  }
+  operator_->system().comm->sum_in_place(std::span(sums));
+  for (std::size_t node = 0; node < pocket_of_node_.size(); ++node) {
+    if (pocket_of_node_[node] < 0) continue;
+    const auto pocket = static_cast<std::size_t>(pocket_of_node_[node]);
+    pressure_correction_[node] += static_cast<float>(sums[pocket] * pocket_weights_[pocket]);
+  }
 }
 
 void StokesPreconditioner::make_border_block() {
@@ -126,6 +160,7 @@ void StokesPreconditioner::apply(const Real* residual, Real* correction) {
     for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] = residual[node * (dim + 1) + d];
   }
   pressure_->apply(pressure_residual_.data(), pressure_correction_);
+  add_pockets(residual);
   for (std::size_t node = 0; node < rows; ++node) {
     correction[node * (dim + 1) + dim] = blocks_.scaling * static_cast<Real>(pressure_correction_[node]);
     for (LocalId k = settings_.positive ? 0 : blocks_.graph.offsets[node];
@@ -165,6 +200,10 @@ std::string StokesPreconditioner::table() const {
   }
   text += fmt::format("pressure: {} Chebyshev steps on [{:.2f}, {:.2f}]\n", settings_.chebyshev_steps,
                       pressure_->bounds().low, pressure_->bounds().high);
+  if (!pocket_weights_.empty() || open_regions_ > 0) {
+    text +=
+        fmt::format("{} closed soft pockets deflated, {} soft regions open\n", pocket_weights_.size(), open_regions_);
+  }
   return text;
 }
 

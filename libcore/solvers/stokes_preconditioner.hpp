@@ -10,15 +10,17 @@
 #include "solvers/multigrid/velocity_multigrid.hpp"
 #include "solvers/preconditioner_settings.hpp"
 #include "solvers/pressure_block.hpp"
+#include "solvers/soft_pockets.hpp"
 
 namespace malleus {
 
 /// The settings with `automatic` replaced by what the viscosities of the system ask for. Collective.
 PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSystem& system);
 
-/// z_p = -S^-1 r_p, z_q = E^-1 r_q, z_v = A^-1 (r_v - B^T z_p - g z_q): A^-1 one multigrid cycle, S = M(1/eta)/2 + C
-/// by Chebyshev steps, E = d - g^T A^-1 g. With the exact blocks a Krylov method would need a few iterations; it
-/// needs 25-30 with these, at any mesh size. Holds no reference to the system it was made from.
+/// z_p = -(S^-1 + sum_k e_k e_k^T / E_k) r_p, z_q = E^-1 r_q, z_v = A^-1 (r_v - B^T z_p - g z_q): A^-1 one multigrid
+/// cycle, S = M(1/eta)/2 + C by Chebyshev steps, E = d - g^T A^-1 g; e_k is 1 on the nodes of closed soft pocket k, E_k
+/// = 1.5 V_k/eta. With the exact blocks a Krylov method would need a few iterations; it needs 25-30 with these, at any
+/// mesh size. Holds no reference to the system it was made from.
 class StokesPreconditioner {
  public:
   /// settings: resolved. Collective.
@@ -33,6 +35,8 @@ class StokesPreconditioner {
   std::size_t bytes() const;    ///< held by this rank
 
  private:
+  void find_pockets(const LinearSystem& system);
+  void add_pockets(const Real* residual);
   void make_border_block();
   void solve_velocity(std::vector<Real>& right_side, Real* correction);
 
@@ -42,6 +46,9 @@ class StokesPreconditioner {
   std::unique_ptr<PressureBlock> pressure_;
   std::unique_ptr<VelocityMultigrid> velocity_;
   Eigen::MatrixXd border_inverse_;
+  std::vector<Real> pocket_weights_;      ///< [pocket] 1/E of its constant pressure, in the blocks' scaling
+  std::vector<GlobalId> pocket_of_node_;  ///< [node], with copies; -1 = none; empty without pockets
+  int open_regions_ = 0;
   std::vector<float> pressure_residual_;    ///< [owned node]
   std::vector<float> pressure_correction_;  ///< [node], with copies
   std::vector<Real> velocity_residual_;     ///< [owned node][dim]

@@ -1,5 +1,6 @@
 #include "support/stokes_cavity.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace malleus::test {
@@ -73,9 +74,10 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
     for (const LocalId node : mesh_.nodes_of_element(element)) {
       for (int d = 0; d < dim; ++d) center[static_cast<std::size_t>(d)] += mesh_.point(node)[d] / (dim + 1);
     }
-    for (const Sphere& sphere : options.spheres) {
-      if (!is_inside(sphere, center.data(), dim)) continue;
-      viscosity[static_cast<std::size_t>(element)] = options.viscosity_scale * options.inside;
+    const bool is_in_sphere = std::any_of(options.spheres.begin(), options.spheres.end(),
+                                          [&](const Sphere& sphere) { return is_inside(sphere, center.data(), dim); });
+    if (is_in_sphere) viscosity[static_cast<std::size_t>(element)] *= options.inside;
+    if (is_in_sphere == (options.inside >= 1)) {
       loads.element_force[static_cast<std::size_t>((element + 1) * dim - 1)] = -10 * options.viscosity_scale;
     }
   }

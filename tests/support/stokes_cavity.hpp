@@ -26,8 +26,8 @@ struct CavityOptions {
 /// `count` spheres of radius 0.05 to 0.13 in the unit box, always the same; apart from each other where `disjoint`.
 std::vector<Sphere> spread_spheres(int count, bool disjoint);
 
-/// A box of the unit size whose lid moves, 16 x (1-x) y (1-y) along x, with spheres of another viscosity and weight
-/// (10 N/m^3 downward).
+/// A box of the unit size whose lid moves, 16 x (1-x) y (1-y) along x, with spheres of another viscosity. The
+/// stiffer material has a weight, 10 N/m^3 for a viscosity of 1.
 class StokesCavity {
  public:
   StokesCavity(const Communicator& comm, const CavityOptions& options);
