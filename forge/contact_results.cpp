@@ -8,8 +8,8 @@ namespace {
 /// Limits of friction have settled where they change by less than this share of all friction.
 constexpr Real settled_friction = 1e-3;
 constexpr int most_friction_passes = 6;
-/// Passes after which points may lose friction but gain none, so that the set of rubbing points settles.
-constexpr int most_free_passes = 4;
+/// Share of the contact area that must come to hold for a pass with its friction in the same increment.
+constexpr Real many_points = 0.05;
 
 }  // namespace
 
@@ -66,7 +66,7 @@ bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface
   GlobalId active = 0;
   for (const ContactPoint& point : contact_.points()) {
     const Vector slip = contact_.slip(point, space, unknowns);
-    const ContactTraction& traction = tractions_.emplace_back(contact_traction(point.normal, point.friction, slip));
+    const ContactTraction& traction = tractions_.emplace_back(ContactTerm::traction(point, slip));
     gaps_.push_back(-effective_step * (point.normal.offset - point.normal.normal.dot(slip)));
     if (!(traction.pressure > 0)) continue;
     ++active;
@@ -90,20 +90,28 @@ bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface
   return again;
 }
 
-/// Points that hold rub, others do not. A point that keeps changing its mind stays without friction.
+/// Points that hold rub, others do not. Those that no longer hold lose their friction at once; those that came to hold
+/// gain it after the first pass where they are many (a first contact), else in the next increment: friction that sticks
+/// makes each change of the set a new problem, and the few nodes at the border of a contact would change it for ever.
 bool ContactFlow::update_rubbing(int pass) {
-  std::array<Real, 2> areas = {0, 0};  // of changed points, of all that hold
+  std::array<Real, 3> areas = {0, 0, 0};  // of points that hold, that lost their friction, that could gain some
+  const auto changes = [&](std::size_t i) {
+    const ContactPoint& point = contact_.points()[i];
+    return point.friction.scale > 0 && point.rubs != (tractions_[i].pressure > 0);
+  };
   for (std::size_t i = 0; i < tractions_.size(); ++i) {
     ContactPoint& point = contact_.points()[i];
-    const bool holds = tractions_[i].pressure > 0;
-    if (holds) areas[1] += point.area;
-    if (!(point.friction.scale > 0) || holds == point.rubs) continue;
-    if (pass >= most_free_passes && holds) continue;
-    point.rubs = holds;
-    areas[0] += point.area;
+    if (tractions_[i].pressure > 0) areas[0] += point.area;
+    if (!changes(i)) continue;
+    areas[point.rubs ? 1 : 2] += point.area;
+    if (point.rubs) point.rubs = false;
   }
   scene_.comm->sum_in_place(areas);
-  return areas[0] > 0;
+  const bool gains = pass == 0 && areas[2] > many_points * areas[0];
+  for (std::size_t i = 0; gains && i < tractions_.size(); ++i) {
+    if (changes(i)) contact_.points()[i].rubs = true;
+  }
+  return areas[1] > 0 || gains;
 }
 
 bool ContactFlow::update_friction(const FreeSurface& surface) {

@@ -211,6 +211,13 @@ class Contact(Forging):
             for row, expected in zip(rows, reference):
                 self.assertAlmostEqual(row["force_lower_y_N"] / expected["force_lower_y_N"], 1, delta=1e-5)
 
+    def test_friction_between_bodies_balances(self):
+        text = self.blocks(2, (4, 4), (6, 6), consistency=3 * K).replace("slave = upper\n", "slave = upper\nfriction = 1\n")
+        row = self.forge(text)[0]
+        self.assertAlmostEqual(row["force_lower_y_N"] / row["force_top_y_N"], -1, delta=1e-5)
+        self.assertAlmostEqual(row["force_bottom_y_N"] / row["force_top_y_N"], -1, delta=1e-5)
+        self.assertGreater(abs(row["force_lower_x_N"]), 1e-3 * row["force_top_y_N"])
+
     def test_a_rigid_body_is_a_master_without_unknowns(self):
         text = self.blocks(2, (4, 4), (6, 6)).replace("rate_sensitivity = 0.3\n", "law = rigid\n", 1)
         text = text.replace(f"consistency = {K!r}\nlaw = rigid", "law = rigid")
