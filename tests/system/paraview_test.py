@@ -26,7 +26,7 @@ def run_case(program, case, mesh_arguments, settings, ranks, folder):
 
 class Opening:
     """The checks of one run's output; `run` is the arguments of run_case."""
-    run = None
+    job = None
     fields_at_nodes = set()
 
     @classmethod
@@ -36,7 +36,7 @@ class Opening:
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         cls.enterClassContext(virtual_display.started())
-        cls.xdmf = run_case(*cls.run, pathlib.Path(cls.folder.name))
+        cls.xdmf = run_case(*cls.job, pathlib.Path(cls.folder.name))
         cls.expected = paraview_open.expected(cls.xdmf.parent)
 
     def check(self, found):
@@ -50,7 +50,7 @@ class Opening:
                 self.assertAlmostEqual(seen["bounds"][2 * k], state.points[:, k].min(), places=7)
                 self.assertAlmostEqual(seen["bounds"][2 * k + 1], state.points[:, k].max(), places=7)
             self.assertLessEqual(self.fields_at_nodes, set(seen["nodes"]))
-            self.assertEqual(seen["elements"]["partition"], [0, self.run[-1] - 1])
+            self.assertEqual(seen["elements"]["partition"], [0, self.job[-1] - 1])
 
     def test_serial(self):
         self.check(paraview_open.open_serial(self.xdmf))
@@ -60,7 +60,7 @@ class Opening:
 
 
 class Filling(Opening, unittest.TestCase):
-    run = ("inject", "channel", ["--across", "4"], ["time.end=0.1 s", "time.step=10 ms"], 3)
+    job = ("inject", "channel", ["--across", "4"], ["time.end=0.1 s", "time.step=10 ms"], 3)
     fields_at_nodes = {"velocity", "pressure", "level_set"}
 
     def test_through_a_server(self):
@@ -78,7 +78,7 @@ class Filling(Opening, unittest.TestCase):
 
 
 class Forging(Opening, unittest.TestCase):
-    run = ("forge", "upsetting", ["--size", "5"], ["time.stroke=1 mm", "output.every=1"], 3)
+    job = ("forge", "upsetting", ["--size", "5"], ["time.stroke=1 mm", "output.every=1"], 3)
     fields_at_nodes = {"velocity", "pressure"}
 
 
