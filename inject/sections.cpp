@@ -115,17 +115,8 @@ void InitialFluid::describe(Section& s) {
 
 void InitialShape::describe(Section& s) {
   s.string("fluid", fluid, "that is there at the start").required().starter("melt").names_section("fluid");
-  const Converter<Shape> shapes = [] {
-    const std::vector<std::pair<std::string, Shape>> known = {
-        {"sphere", Shape::sphere}, {"box", Shape::box}, {"half-space", Shape::half_space}};
-    const auto index = choice_converter({"sphere", "box", "half-space"});
-    return Converter<Shape>{
-        index.type, "", [index, known](std::string_view raw, Key& key) { return known[index.read(raw, key)].second; },
-        [known](const Shape& value) {
-          return std::find_if(known.begin(), known.end(), [&](const auto& k) { return k.second == value; })->first;
-        }};
-  }();
-  s.custom("shape", shape, shapes, "of the fluid's part (in 2D a sphere is a disc, a half-space a half-plane)");
+  s.choice("shape", shape, {{"sphere", Shape::sphere}, {"box", Shape::box}, {"half-space", Shape::half_space}},
+           "of the fluid's part (in 2D a sphere is a disc, a half-space a half-plane)");
   s.vector("center", center, "m", "of a sphere or box").starter("0 0 0 mm");
   s.real("radius", radius, "m", "of a sphere").above(0);
   s.vector("size", size, "m", "edge lengths of a box");

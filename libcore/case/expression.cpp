@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <muParser.h>
 
+#include <algorithm>
 #include <cfenv>
 #include <cmath>
 #include <numbers>
@@ -156,6 +157,29 @@ void Expression::evaluate(std::span<const Real> coordinates, int dimension, Real
     const Real* point = coordinates.data() + i * stride;
     values[i] = formula_->value(point[0], stride > 1 ? point[1] : 0, stride > 2 ? point[2] : 0, time);
   }
+}
+
+void Expression::refuse_value(const std::array<Real, 3>& point, Real time, Real value) const {
+  throw InputError(fmt::format("{}expression '{}' gives {} at ({:.6g}, {:.6g}, {:.6g}) m, t = {:.6g} s",
+                               source_.empty() ? "" : source_ + ": ", text_, value, point[0], point[1], point[2],
+                               time));
+}
+
+Real Expression::finite_at(const std::array<Real, 3>& point, Real time) const {
+  const Real value = (*this)(point, time);
+  if (!std::isfinite(value)) refuse_value(point, time, value);
+  return value;
+}
+
+void Expression::evaluate_finite(std::span<const Real> coordinates, int dimension, Real time,
+                                 std::span<Real> values) const {
+  evaluate(coordinates, dimension, time, values);
+  const auto wrong = std::find_if(values.begin(), values.end(), [](Real value) { return !std::isfinite(value); });
+  if (wrong == values.end()) return;
+  const auto first = static_cast<std::size_t>(wrong - values.begin()) * static_cast<std::size_t>(dimension);
+  std::array<Real, 3> point = {};
+  std::copy_n(coordinates.begin() + static_cast<std::ptrdiff_t>(first), dimension, point.begin());
+  refuse_value(point, time, *wrong);
 }
 
 }  // namespace malleus

@@ -35,10 +35,22 @@ class Expression {
   /// At many points: coordinates [points][dimension], dimension 1 to 3; values [points].
   void evaluate(std::span<const Real> coordinates, int dimension, Real time, std::span<Real> values) const;
 
+  /// The same, throwing InputError (file, line and key, formula, point and time) where a value is not finite. Local: in
+  /// parallel within agree().
+  Real finite_at(const std::array<Real, 3>& point, Real time) const;
+  void evaluate_finite(std::span<const Real> coordinates, int dimension, Real time, std::span<Real> values) const;
+
+  /// "case.ini:12: [reference] pressure", for messages; empty where no case file gave it.
+  const std::string& source() const { return source_; }
+  void set_source(const std::string& source) { source_ = source; }
+
  private:
   class Formula;
 
+  [[noreturn]] void refuse_value(const std::array<Real, 3>& point, Real time, Real value) const;
+
   std::string text_;
+  std::string source_;
   Real constant_ = 0;
   std::shared_ptr<Formula> formula_;
 };

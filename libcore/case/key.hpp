@@ -58,6 +58,7 @@ struct Key {
   std::string referred_section;
   PathRule path_rule = PathRule::none;
   std::filesystem::path case_directory;
+  std::string source;  ///< "case.ini:12: [section] key" of the value being read
 
   // What was learnt from the value that was read.
   int components = 0;                     ///< of a vector

@@ -111,7 +111,7 @@ void CaseReader::note_references(const Section& section, const Key& key, const C
     needed_paths_.push_back({entry.place, subject, key.path_rule, given.is_absolute() ? given : directory() / given});
   }
   if (key.is_only_in_3d) given_vectors_.push_back({entry.place, subject, 0});
-  if (key.is_vector && key.components > 0) given_vectors_.push_back({entry.place, subject, key.components});
+  if (key.components > 0) given_vectors_.push_back({entry.place, subject, key.components});
 }
 
 bool CaseReader::given(std::string_view section, std::string_view key) const {

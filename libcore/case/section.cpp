@@ -183,6 +183,7 @@ void Section::read_value(Key& key, const CaseEntry& entry) {
   const std::string_view raw = entry.value;
   const bool is_broken = raw.empty() || std::count(raw.begin(), raw.end(), '"') % 2 != 0;
   if (is_broken) return;  // the case file has reported it
+  key.source = fmt::format("{}: [{}] {}", entry.place.text(), title_, key.name);
   try {
     key.assign(raw);
   } catch (const InputError& error) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -63,8 +64,12 @@ class Section {
   KeyOf<std::filesystem::path> path(std::string_view name, std::filesystem::path& member, std::string_view text);
   /// {"norton-hoff", Law::norton_hoff}, ...: every value that the enum can have.
   template <class Enum>
-  KeyOf<Enum> choice(std::string_view name, Enum& member, std::vector<std::pair<std::string, Enum>> choices,
-                     std::string_view text);
+  requires std::is_enum_v<Enum> KeyOf<Enum> choice(std::string_view name, Enum& member,
+                                                   std::vector<std::pair<std::string, Enum>> choices,
+                                                   std::string_view text);
+  template <class Enum>
+  KeyOf<Enum> choice(std::string_view name, std::optional<Enum>& member,
+                     std::vector<std::pair<std::string, Enum>> choices, std::string_view text);
   /// A type of the caller's own.
   template <class T, class Member>
   KeyOf<T> custom(std::string_view name, Member& member, const Converter<T>& converter, std::string_view text);
@@ -100,6 +105,9 @@ class Section {
   /// @}
 
  private:
+  template <class Enum, class Member>
+  KeyOf<Enum> bind_choice(std::string_view name, Member& member, std::vector<std::pair<std::string, Enum>> choices,
+                          std::string_view text);
   Key& add(std::string_view name, std::string_view type, std::string_view unit, std::string_view text);
   void read_value(Key& key, const CaseEntry& entry);
   Place place() const;
@@ -133,6 +141,7 @@ KeyOf<T> Section::custom(std::string_view name, Member& member, const Converter<
       }
     }();
     detail::check_numbers(key, value);
+    if constexpr (std::is_same_v<T, Expression>) value.set_source(key.source);
     member = std::move(value);
   };
   key.print = [&member, &key, write = converter.write]() -> std::string {
@@ -146,8 +155,21 @@ KeyOf<T> Section::custom(std::string_view name, Member& member, const Converter<
 }
 
 template <class Enum>
-KeyOf<Enum> Section::choice(std::string_view name, Enum& member, std::vector<std::pair<std::string, Enum>> choices,
-                            std::string_view text) {
+requires std::is_enum_v<Enum> KeyOf<Enum> Section::choice(std::string_view name, Enum& member,
+                                                          std::vector<std::pair<std::string, Enum>> choices,
+                                                          std::string_view text) {
+  return bind_choice(name, member, std::move(choices), text);
+}
+
+template <class Enum>
+KeyOf<Enum> Section::choice(std::string_view name, std::optional<Enum>& member,
+                            std::vector<std::pair<std::string, Enum>> choices, std::string_view text) {
+  return bind_choice(name, member, std::move(choices), text);
+}
+
+template <class Enum, class Member>
+KeyOf<Enum> Section::bind_choice(std::string_view name, Member& member,
+                                 std::vector<std::pair<std::string, Enum>> choices, std::string_view text) {
   std::vector<std::string> names;
   for (const auto& choice : choices) names.push_back(choice.first);
   const Converter<std::size_t> index = choice_converter(names);

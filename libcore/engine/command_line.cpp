@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "base/error.hpp"
+#include "base/text.hpp"
 #include "parallel/session.hpp"
 #include "storage/h5_file.hpp"
 
@@ -36,9 +37,24 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->expected(0, 1)
       ->default_str("");
   app.add_flag("--template", line.print_template, "Prints a commented starter case");
+  app.add_flag("--case-page", line.print_case_page, "Prints --help-case as a page in Markdown");
   app.add_flag("--quiet", line.quiet, "Prints warnings and errors alone");
   app.add_flag("--verbose", line.verbose, "Prints details of the solvers too");
   app.set_help_flag("-h,--help", "Prints this");
+}
+
+/// "; did you mean '--output'?" for the first option that the program does not have.
+std::string nearest_option(const CLI::App& app, const std::vector<std::string>& arguments) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (const std::string& argument : arguments) {
+    const std::string name = argument.substr(0, argument.find('='));
+    const bool is_unknown = name.starts_with("--") && std::find(known.begin(), known.end(), name) == known.end();
+    if (is_unknown) return did_you_mean(name, known);
+  }
+  return {};
 }
 
 }  // namespace
@@ -63,10 +79,11 @@ CommandLine parse_command_line(const std::string& program, const std::string& de
     line.answer = app.help();
     return line;
   } catch (const CLI::ParseError& error) {
-    throw InputError(fmt::format("command line: {} (see {} --help)", error.what(), program));
+    throw InputError(
+        fmt::format("command line: {}{} (see {} --help)", error.what(), nearest_option(app, arguments), program));
   }
   if (version) line.answer = version_text(program);
-  const bool needs_no_case = !line.answer.empty() || line.help_case || line.print_template;
+  const bool needs_no_case = !line.answer.empty() || line.help_case || line.print_template || line.print_case_page;
   if (line.case_file.empty() && !needs_no_case) {
     throw InputError(
         fmt::format("command line: the case file is missing: {} [options] CASE.ini (see {} --help)", program, program));

@@ -22,6 +22,7 @@ struct CommandLine {
   bool verbose = false;
   std::optional<std::string> help_case;  ///< a section, or empty for all
   bool print_template = false;
+  bool print_case_page = false;
   std::string answer;  ///< text to print instead of a run: --help, --version
 };
 

@@ -30,10 +30,12 @@ std::string level_name(Level level) {
 /// Prints what was asked for instead of a run; whether anything was.
 bool answer_questions(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
   std::string answer = line.answer;
-  if (answer.empty() && (line.help_case || line.print_template)) {
+  if (answer.empty()) {
     CaseReader reader;
     simulator.describe(reader);
-    answer = line.print_template ? template_text(reader, simulator.program()) : help_text(reader, *line.help_case);
+    if (line.help_case) answer = help_text(reader, *line.help_case);
+    if (line.print_template) answer = template_text(reader, simulator.program());
+    if (line.print_case_page) answer = markdown_page(reader, simulator.program());
   }
   if (answer.empty()) return false;
   if (comm.is_root()) fmt::print("{}\n", answer);

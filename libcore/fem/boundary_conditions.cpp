@@ -1,11 +1,8 @@
 #include "fem/boundary_conditions.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.hpp"
 #include "parallel/agreement.hpp"
 
 namespace malleus {
@@ -57,12 +54,7 @@ std::vector<Real> normal_moments(const Mesh& mesh, std::int32_t group, Geometry 
 Real finite_value(const Expression& expression, const Mesh& mesh, LocalId node, Real time) {
   std::array<Real, 3> point{};
   std::copy_n(mesh.point(node), mesh.dim, point.begin());
-  const Real value = expression(point, time);
-  if (!std::isfinite(value)) {
-    throw InputError(fmt::format("the expression \"{}\" is not finite at ({:.6g}, {:.6g}, {:.6g}) m, t = {:.6g} s",
-                                 expression.text(), point[0], point[1], point[2], time));
-  }
-  return value;
+  return expression.finite_at(point, time);
 }
 
 void fix_components(const Mesh& mesh, const BoundaryCondition& condition, const GroupNormals& normals, Real time,

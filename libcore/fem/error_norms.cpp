@@ -1,12 +1,9 @@
 #include "fem/error_norms.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "base/error.hpp"
 #include "fem/quadrature.hpp"
 #include "parallel/agreement.hpp"
 
@@ -20,12 +17,7 @@ using Weights = Eigen::Matrix<Real, D + 1, 1>;
 Real value_at(const Expression& expression, const Real* point, int dim, Real time) {
   std::array<Real, 3> place{};
   std::copy_n(point, dim, place.begin());
-  const Real value = expression(place, time);
-  if (!std::isfinite(value)) {
-    throw InputError(fmt::format("the known solution \"{}\" is not finite at ({:.6g}, {:.6g}, {:.6g}) m, t = {:.6g} s",
-                                 expression.text(), place[0], place[1], place[2], time));
-  }
-  return value;
+  return expression.finite_at(place, time);
 }
 
 /// Values of a nodal field at an element's vertices, a column a vertex.

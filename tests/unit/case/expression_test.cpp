@@ -79,6 +79,23 @@ TEST(Expression, ResultsMayBeNotFiniteWithoutTrap) {
   EXPECT_EQ(std::fetestexcept(FE_INVALID | FE_DIVBYZERO), 0);
 }
 
+TEST(Expression, FiniteValuesAreDemandedWithThePlace) {
+  Expression formula = Expression::parse("1/(x-y)");
+  formula.set_source("test.ini:3: [body_force] x");
+  EXPECT_EQ(formula.finite_at({3, 1, 0}, 0), 0.5);
+  try {
+    formula.finite_at({1, 1, 2}, 0.5);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "test.ini:3: [body_force] x: expression '1/(x-y)' gives inf at (1, 1, 2) m, t = 0.5 s");
+  }
+  const std::array<Real, 6> coordinates = {3, 1, 2, 1, 5, 5};
+  std::array<Real, 3> values = {};
+  EXPECT_NO_THROW(formula.evaluate_finite(std::span(coordinates).first(4), 2, 0, std::span(values).first(2)));
+  EXPECT_EQ(values[1], 1.0);
+  EXPECT_THROW(formula.evaluate_finite(coordinates, 2, 0, values), InputError);
+}
+
 TEST(Expression, FaultsNameTheirPosition) {
   EXPECT_EQ(message_of("2*sx"), "expression '2*sx' is not understood at letter 3: unknown 'sx'; did you mean 'x'?");
   EXPECT_NE(message_of("1 + wrong(x)").find("at letter 5: unknown 'wrong'"), std::string::npos);

@@ -96,7 +96,7 @@ TEST(Help, ThePageHasARowForEachKey) {
     for (const Key& key : description.keys) EXPECT_TRUE(holds(page, "| `" + key.name + "` | "));
     n_keys += description.keys.size();
   }
-  EXPECT_EQ(n_keys, 25U);
+  EXPECT_EQ(n_keys, 26U);
   EXPECT_TRUE(holds(page, "norton-hoff \\| newtonian \\| rigid"));
 }
 

@@ -41,6 +41,12 @@ TEST(CaseReader, CommandLineWins) {
   EXPECT_EQ(result.time.tolerance, 1e-3);
 }
 
+TEST(CaseReader, ExpressionsKnowWhereTheyWereWritten) {
+  const SampleCase result = read_sample(good_case, {"gravity.force_x=x+1"});
+  EXPECT_EQ(result.gravity->force[0]->source(), "command line: [gravity] force_x");
+  EXPECT_EQ(result.gravity->strength.source(), "");
+}
+
 TEST(CaseReader, ReportsAllMistakesAtOnce) {
   const std::string message = message_of(R"([bdy.billet]
 group = x
@@ -80,7 +86,7 @@ TEST(CaseReader, RefusesUnknownAndMisnamedSections) {
 TEST(CaseReader, RefusesUnknownKeys) {
   EXPECT_EQ(message_of_body("law = rigid\nzzz = 1\n"),
             "test.ini:4: unknown key 'zzz' in [body.a]; known are group, law, rate_sensitivity, consistency, density, "
-            "against, velocity");
+            "against, later, velocity");
   EXPECT_EQ(message_of_body("law = rigid\n"), "");
 }
 
@@ -112,6 +118,17 @@ TEST(CaseReader, RefusesWrongValuesOfEveryType) {
   for (const auto& [line, expected] : gravity_lines) {
     EXPECT_EQ(message_of_body("law = rigid\n[gravity]\n" + line), "test.ini:5: " + expected);
   }
+}
+
+TEST(CaseReader, AChoiceMayBeLeftOpen) {
+  const auto later = [](const std::string& line) {
+    return read_sample("[body.a]\ngroup = a\nlaw = rigid\n" + line).bodies[0].later;
+  };
+  EXPECT_FALSE(later(""));
+  EXPECT_FALSE(later("later = same"));
+  EXPECT_EQ(later("later = rigid"), Law::rigid);
+  EXPECT_EQ(message_of_body("law = rigid\nlater = soft"),
+            "test.ini:4: [body.a] later = soft: expected one of newtonian | rigid, nor 'same'");
 }
 
 TEST(CaseReader, ChecksTheExponentOfAUnit) {

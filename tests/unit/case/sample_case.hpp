@@ -25,6 +25,7 @@ struct Body {
   Real rate_sensitivity = 1;
   std::optional<Real> density;
   std::string against;
+  std::optional<Law> later;
   std::optional<std::array<std::optional<Real>, 3>> velocity;
 
   void describe(Section& s) {
@@ -38,6 +39,8 @@ struct Body {
         .exponent_is("rate_sensitivity", rate_sensitivity);
     s.real("density", density, "kg/m^3", "mass per volume").above(0);
     s.string("against", against, "another body").names_section("body");
+    s.choice("later", later, {{"newtonian", Law::newtonian}, {"rigid", Law::rigid}}, "law after the stroke")
+        .or_word("same");
     s.partial_vector("velocity", velocity, "m/s", "imposed").starter("0 0 free mm/s");
   }
   void validate(Section& s) const {
