@@ -60,7 +60,7 @@ std::array<Real, 3> Boundaries::velocity_at(std::size_t boundary, const Real* po
   std::array<Real, 3> place = {point[0], point[1], mesh_->dim == 3 ? point[2] : 0.0};
   std::array<Real, 3> velocity = {0, 0, 0};
   for (std::size_t c = 0; c < static_cast<std::size_t>(mesh_->dim); ++c) {
-    if (components[c]) velocity[c] = (*components[c])(place, time);
+    if (components[c]) velocity[c] = components[c]->finite_at(place, time);
   }
   return velocity;
 }

@@ -24,13 +24,13 @@ std::array<Real, 3> asked_velocity(const InletSettings& inlet, const std::array<
                                    int dim, Real time) {
   std::array<Real, 3> velocity = {0, 0, 0};
   if (inlet.velocity && inlet.velocity->speed) {
-    const Real speed = (*inlet.velocity->speed)(place, time);
+    const Real speed = inlet.velocity->speed->finite_at(place, time);
     for (int c = 0; c < dim; ++c) velocity[static_cast<std::size_t>(c)] = speed * inward[c];
     return velocity;
   }
   const ExpressionVector& components = inlet.velocity ? inlet.velocity->vector : inlet.velocity_components;
   for (std::size_t c = 0; c < static_cast<std::size_t>(dim); ++c) {
-    if (components[c]) velocity[c] = (*components[c])(place, time);
+    if (components[c]) velocity[c] = components[c]->finite_at(place, time);
   }
   return velocity;
 }
@@ -208,7 +208,7 @@ StokesLoads make_loads(const Scene& scene, const Mixture& mixture, const std::ve
     loads.node_force.resize(n * dim);
     std::vector<Real> component(n);
     for (std::size_t c = 0; c < dim; ++c) {
-      force->force[c].evaluate(scene.mesh.coordinates, scene.mesh.dim, time, component);
+      force->force[c].evaluate_finite(scene.mesh.coordinates, scene.mesh.dim, time, component);
       for (std::size_t node = 0; node < n; ++node) loads.node_force[node * dim + c] = component[node];
     }
   }

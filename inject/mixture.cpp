@@ -124,7 +124,12 @@ void Mixture::evaluate_fluid(const Fluid& fluid, const Mesh& mesh, std::span<con
         }
       }
     }
-    fluid.given.evaluate(centroids, mesh.dim, 0, viscosity);
+    fluid.given.evaluate_finite(centroids, mesh.dim, 0, viscosity);
+    const auto least = std::min_element(viscosity.begin(), viscosity.end());
+    if (least != viscosity.end() && !(*least > 0)) {
+      throw InputError(fmt::format("{} = {}: the viscosity is {:.6g} Pa.s somewhere; it must be above 0",
+                                   fluid.given.source(), fluid.given.text(), *least));
+    }
   }
   for (std::size_t e = 0; e < viscosity.size(); ++e) {
     if (viscosity[e] >= fluid.lowest) continue;

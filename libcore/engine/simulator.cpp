@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "case/help.hpp"
@@ -73,6 +75,19 @@ RunSettings run_settings(const CommandLine& line, Simulator& simulator) {
   return settings;
 }
 
+/// Fields asked for that the scene does not have.
+void check_output_fields(const Process& process, const CommonSections& common, CaseReader& reader) {
+  const std::vector<std::string> known = process.output_fields();
+  for (const std::string& name : common.output.fields) {
+    const bool is_known =
+        name == "region" || name == "partition" || std::find(known.begin(), known.end(), name) != known.end();
+    if (!is_known) {
+      reader.fail("output", "fields",
+                  fmt::format("'{}' is no field of this scene; it has {}", name, fmt::join(known, ", ")));
+    }
+  }
+}
+
 int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
   CommonSections& common = simulator.common();
   common.case_settings.name = line.case_file.stem().string();
@@ -81,9 +96,15 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   reader.finish();
   FieldStore file_fields;
   Mesh mesh = load_mesh(comm, common.mesh.file, common.mesh.length_scale(), file_fields);
-  reader.check_mesh({mesh.dim, mesh.region_names, mesh.group_names});
+  if (common.case_settings.geometry == CaseGeometry::axisymmetric && mesh.dim == 3) {
+    reader.fail("case", "geometry", "axisymmetric scenes want a mesh of two dimensions; this one has three");
+  }
+  const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
+  reader.check_mesh(names);
   RunSettings settings = run_settings(line, simulator);
   const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
+  check_output_fields(*process, common, reader);
+  reader.check_mesh(names);
   settings.resolved_case = reader.resolved(settings.directory);
   return Engine(comm, *process, std::move(settings)).run();
 }
