@@ -190,8 +190,9 @@ std::vector<Fluid> make_fluids(const InjectCase& settings, Real cut_off, Real co
     fluid.lowest = std::max(thickest / contrast, std::numeric_limits<Real>::min());
     if (source.reference_viscosity() < fluid.lowest && !fluid.is_given) {
       log::info(
-          "the viscosity of {} is taken as {:.3g} Pa.s in place of {:.3g}: 1/{:.0g} of the thickest fluid's "
-          "([front] contrast)",
+          "the viscosity of {} is taken as {:.3g} Pa.s in place of {:.3g}: no fluid is more than {:g} times as thick "
+          "as "
+          "another ([front] contrast)",
           fluid.name, fluid.lowest, source.reference_viscosity(), contrast);
     }
   }

@@ -315,6 +315,15 @@ void InjectCase::check(CaseReader& reader) const {
   refuse(common.thermal.has_value(), "thermal", "inject models no heat yet; remove the section");
   refuse(common.inertia.has_value(), "inertia", "inject models no inertia yet; remove the section");
   refuse(common.remesh.has_value() && common.remesh->active, "remesh", "inject does not remesh yet; set active = no");
+  refuse(common.air.has_value(), "air", "inject does not compress trapped air yet; remove the section");
+  if (front.transport == FrontSettings::Transport::trace) {
+    reader.fail("front", "transport", "trace is not available yet; use crank-nicolson");
+  }
+  for (const FluidSettings& fluid : fluids) {
+    if (fluid.law == FluidSettings::Law::empty) {
+      reader.fail("fluid." + fluid.name, "law", "void is not available yet; give the fluid a small viscosity");
+    }
+  }
   if (common.gravity) {
     for (const FluidSettings& fluid : fluids) {
       if (!fluid.density && fluid.law != FluidSettings::Law::empty) {
