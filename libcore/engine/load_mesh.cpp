@@ -10,7 +10,9 @@
 
 namespace malleus {
 
-Mesh load_mesh(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields) {
+namespace {
+
+Mesh read_any(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields) {
   const std::string ending = path.extension().string();
   if (ending == ".msh") return build_mesh(comm, read_msh(comm, path.string(), length_unit));
   if (ending == ".mesh" || ending == ".meshb") {
@@ -24,6 +26,14 @@ Mesh load_mesh(const Communicator& comm, const std::filesystem::path& path, Real
   throw InputError(
       fmt::format("{}: meshes are read from .msh, .h5, .mesh and .meshb files (meshtool convert makes them from CAD)",
                   path.string()));
+}
+
+}  // namespace
+
+Mesh load_mesh(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields) {
+  Mesh mesh = read_any(comm, path, length_unit, fields);
+  if (mesh.total_elements == 0) throw InputError(fmt::format("{}: holds no elements", path.string()));
+  return mesh;
 }
 
 }  // namespace malleus

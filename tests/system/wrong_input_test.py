@@ -214,7 +214,7 @@ class WrongInput(unittest.TestCase):
 
     def test_broken_meshes_are_refused_with_their_name(self):
         for program in PROGRAMS:
-            for content in (b"", b"no mesh", MESH[:300].encode(), os.urandom(2000)):
+            for content in (b"", b"no mesh", MESH[: len(MESH) // 2].encode(), os.urandom(2000)):
                 with self.subTest(program=program, content=content[:20]), tempfile.TemporaryDirectory() as directory:
                     (pathlib.Path(directory) / "square.msh").write_bytes(content)
                     case = pathlib.Path(directory) / "case.ini"
