@@ -4,6 +4,7 @@
 
 #include "base/error.hpp"
 #include "mesh/simplex.hpp"
+#include "parallel/agreement.hpp"
 
 namespace malleus::forge {
 namespace {
@@ -85,9 +86,11 @@ void Boundaries::add_rigid_bodies(NodeConstraints& constraints, Real time) const
   for (std::size_t region = 0; region < body_loads_.is_rigid.size(); ++region) {
     if (body_loads_.is_rigid[region] == 0) continue;
     std::array<Real, 4> sums = {0, 0, 0, 0};
-    for (std::size_t i = 0; i < settings_.size(); ++i) {
-      if (settings_[i].has_velocity()) add_velocities(i, static_cast<std::int32_t>(region), time, sums);
-    }
+    agree(*comm_, [&] {
+      for (std::size_t i = 0; i < settings_.size(); ++i) {
+        if (settings_[i].has_velocity()) add_velocities(i, static_cast<std::int32_t>(region), time, sums);
+      }
+    });
     comm_->sum_in_place(sums);
     std::array<Real, 3> velocity = {0, 0, 0};
     for (std::size_t c = 0; c < 3 && sums[3] > 0; ++c) velocity[c] = sums[c] / sums[3];
@@ -127,13 +130,14 @@ StokesLoads Boundaries::loads(Real time) const {
       loads.element_force.insert(loads.element_force.end(), force.begin(), force.begin() + dim);
     }
   }
-  if (!body_loads_.force.empty()) {
+  agree(*comm_, [&] {
+    if (body_loads_.force.empty()) return;
     for (LocalId node = 0; node < mesh_->nodes(); ++node) {
-      for (int c = 0; c < dim; ++c) {
-        loads.node_force.push_back(body_loads_.force[static_cast<std::size_t>(c)](point_at(*mesh_, node), time));
+      for (std::size_t c = 0; c < static_cast<std::size_t>(dim); ++c) {
+        loads.node_force.push_back(body_loads_.force[c].finite_at(point_at(*mesh_, node), time));
       }
     }
-  }
+  });
   std::vector<BoundaryLoad> tractions;
   for (std::size_t i = 0; i < settings_.size(); ++i) {
     if (!settings_[i].has_traction() && !settings_[i].pressure) continue;
@@ -145,19 +149,21 @@ StokesLoads Boundaries::loads(Real time) const {
 
 Real Boundaries::largest_speed(Real time) const {
   Real largest = 0;
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (!settings_[i].has_velocity()) continue;
-    for (const LocalId node : nodes_[i]) {
-      const auto velocity = velocity_at(i, mesh_->point(node), time);
-      largest = std::max(largest, std::hypot(velocity[0], velocity[1], velocity[2]));
+  agree(*comm_, [&] {
+    for (std::size_t i = 0; i < settings_.size(); ++i) {
+      if (!settings_[i].has_velocity()) continue;
+      for (const LocalId node : nodes_[i]) {
+        const auto velocity = velocity_at(i, mesh_->point(node), time);
+        largest = std::max(largest, std::hypot(velocity[0], velocity[1], velocity[2]));
+      }
     }
-  }
+  });
   return comm_->max(largest);
 }
 
 std::array<Real, 3> Boundaries::mean_velocity(std::size_t i, Real time) const {
   std::array<Real, 4> sums = {0, 0, 0, 0};
-  add_velocities(i, -1, time, sums);
+  agree(*comm_, [&] { add_velocities(i, -1, time, sums); });
   comm_->sum_in_place(sums);
   std::array<Real, 3> mean = {0, 0, 0};
   for (std::size_t c = 0; c < 3 && sums[3] > 0; ++c) mean[c] = sums[c] / sums[3];

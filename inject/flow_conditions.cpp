@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "parallel/agreement.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -54,8 +55,8 @@ std::vector<std::pair<Eigen::Matrix<Real, D, 1>, Real>> facet_quadrature() {
   }
 }
 
-/// Flow into the cavity [m^3/s] of the velocity that an inlet asks for. Collective.
-Real asked_flow(const Scene& scene, const BoundaryPart& part, Real time) {
+/// This rank's share of the flow into the cavity [m^3/s] of the velocity that an inlet asks for. Local.
+Real share_of_asked_flow(const Scene& scene, const BoundaryPart& part, Real time) {
   const InletSettings& inlet = scene.settings.inlets[part.index];
   Real flow = 0;
   with_dim(scene.mesh.dim, [&](auto d) {
@@ -74,7 +75,14 @@ Real asked_flow(const Scene& scene, const BoundaryPart& part, Real time) {
       }
     }
   });
-  return scene.comm.sum(flow);
+  return flow;
+}
+
+/// That flow over all ranks. Collective.
+Real asked_flow(const Scene& scene, const BoundaryPart& part, Real time) {
+  Real share = 0;
+  agree(scene.comm, [&] { share = share_of_asked_flow(scene, part, time); });
+  return scene.comm.sum(share);
 }
 
 [[noreturn]] void refuse_blocked(const BoundaryPart& part) {
@@ -89,15 +97,17 @@ void feed(const Scene& scene, const BoundaryPart& part, Real flow, Real time, No
   const int dim = scene.mesh.dim;
   const InletSettings& inlet = scene.settings.inlets[part.index];
   std::vector<Real> velocity(static_cast<std::size_t>(scene.mesh.nodes()) * dim, 0);
-  for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
-    if (!part.normals->holds(node)) continue;
-    std::array<Real, 3> inward = {0, 0, 0};
-    for (std::size_t c = 0; c < static_cast<std::size_t>(dim); ++c) inward[c] = -part.normals->normal(node)[c];
-    const auto asked = asked_velocity(inlet, place_of(scene.mesh, node), inward.data(), dim, time);
-    Real* at = velocity.data() + static_cast<std::size_t>(node) * dim;
-    std::copy_n(asked.begin(), dim, at);
-    constraints.project(node, at);
-  }
+  agree(scene.comm, [&] {
+    for (LocalId node = 0; node < scene.mesh.nodes(); ++node) {
+      if (!part.normals->holds(node)) continue;
+      std::array<Real, 3> inward = {0, 0, 0};
+      for (std::size_t c = 0; c < static_cast<std::size_t>(dim); ++c) inward[c] = -part.normals->normal(node)[c];
+      const auto asked = asked_velocity(inlet, place_of(scene.mesh, node), inward.data(), dim, time);
+      Real* at = velocity.data() + static_cast<std::size_t>(node) * dim;
+      std::copy_n(asked.begin(), dim, at);
+      constraints.project(node, at);
+    }
+  });
   const Real discrete = -outflow(scene, part.facets, velocity);
   if (flow != 0 && !(discrete * flow > 0)) refuse_blocked(part);
   const Real factor = flow != 0 ? flow / discrete : 0;
@@ -208,7 +218,8 @@ StokesLoads make_loads(const Scene& scene, const Mixture& mixture, const std::ve
     loads.node_force.resize(n * dim);
     std::vector<Real> component(n);
     for (std::size_t c = 0; c < dim; ++c) {
-      force->force[c].evaluate_finite(scene.mesh.coordinates, scene.mesh.dim, time, component);
+      agree(scene.comm,
+            [&] { force->force[c].evaluate_finite(scene.mesh.coordinates, scene.mesh.dim, time, component); });
       for (std::size_t node = 0; node < n; ++node) loads.node_force[node * dim + c] = component[node];
     }
   }

@@ -9,6 +9,7 @@
 #include "base/log.hpp"
 #include "fem/cut_simplex.hpp"
 #include "mesh/simplex.hpp"
+#include "parallel/agreement.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -37,6 +38,20 @@ std::unique_ptr<const ViscousLaw> make_law(const FluidSettings& fluid, Real cut_
       break;
   }
   return nullptr;
+}
+
+/// [element][dimension]
+std::vector<Real> centroids_of(const Mesh& mesh) {
+  const auto dim = static_cast<std::size_t>(mesh.dim);
+  std::vector<Real> centroids(static_cast<std::size_t>(mesh.elements()) * dim, 0);
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    for (const LocalId node : mesh.nodes_of_element(e)) {
+      for (std::size_t c = 0; c < dim; ++c) {
+        centroids[static_cast<std::size_t>(e) * dim + c] += mesh.point(node)[c] / (mesh.dim + 1);
+      }
+    }
+  }
+  return centroids;
 }
 
 }  // namespace
@@ -114,23 +129,7 @@ void Mixture::evaluate_fluid(const Fluid& fluid, const Mesh& mesh, std::span<con
   std::fill(viscosity.begin(), viscosity.end(), 0);
   std::fill(slope.begin(), slope.end(), 0);
   if (fluid.law) fluid.law->evaluate(shear_rate, viscosity, slope);
-  if (fluid.is_given) {
-    std::vector<Real> centroids(viscosity.size() * static_cast<std::size_t>(mesh.dim), 0);
-    for (std::size_t e = 0; e < viscosity.size(); ++e) {
-      for (const LocalId node : mesh.nodes_of_element(static_cast<LocalId>(e))) {
-        for (int c = 0; c < mesh.dim; ++c) {
-          centroids[e * static_cast<std::size_t>(mesh.dim) + static_cast<std::size_t>(c)] +=
-              mesh.point(node)[c] / (mesh.dim + 1);
-        }
-      }
-    }
-    fluid.given.evaluate_finite(centroids, mesh.dim, 0, viscosity);
-    const auto least = std::min_element(viscosity.begin(), viscosity.end());
-    if (least != viscosity.end() && !(*least > 0)) {
-      throw InputError(fmt::format("{} = {}: the viscosity is {:.6g} Pa.s somewhere; it must be above 0",
-                                   fluid.given.source(), fluid.given.text(), *least));
-    }
-  }
+  if (fluid.is_given) fluid.given.evaluate(centroids_of(mesh), mesh.dim, 0, viscosity);
   for (std::size_t e = 0; e < viscosity.size(); ++e) {
     if (viscosity[e] >= fluid.lowest) continue;
     viscosity[e] = fluid.lowest;
@@ -197,6 +196,20 @@ std::vector<Fluid> make_fluids(const InjectCase& settings, Real cut_off, Real co
     }
   }
   return fluids;
+}
+
+void check_given_viscosities(const Communicator& comm, const Mesh& mesh, const std::vector<Fluid>& fluids) {
+  for (const Fluid& fluid : fluids) {
+    if (!fluid.is_given) continue;
+    agree(comm, [&] {
+      std::vector<Real> viscosity(static_cast<std::size_t>(mesh.elements()));
+      fluid.given.evaluate_finite(centroids_of(mesh), mesh.dim, 0, viscosity);
+      const auto lowest = std::min_element(viscosity.begin(), viscosity.end());
+      if (lowest == viscosity.end() || *lowest > 0) return;
+      throw InputError(fmt::format("{}: expression '{}' gives {:.6g} Pa.s in some element; a viscosity is above zero",
+                                   fluid.given.source(), fluid.given.text(), *lowest));
+    });
+  }
 }
 
 }  // namespace malleus::inject

@@ -77,4 +77,7 @@ class Mixture final : public ViscosityModel {
 /// viscosities; a fluid that is thickened to keep it is named in the log.
 std::vector<Fluid> make_fluids(const InjectCase& settings, Real cut_off, Real contrast);
 
+/// Throws InputError where a viscosity that is given as a formula is not above zero in some element. Collective.
+void check_given_viscosities(const Communicator& comm, const Mesh& mesh, const std::vector<Fluid>& fluids);
+
 }  // namespace malleus::inject

@@ -32,6 +32,7 @@ FillingProcess::FillingProcess(const Communicator& comm, Mesh mesh, const Inject
     : scene_(comm, std::move(mesh), settings), fronts_(scene_) {
   mixture_ = std::make_unique<Mixture>(make_fluids(settings, cut_off(scene_), allowed_contrast(settings)),
                                        settings.initial_fluid(), settings.front.mixture, settings.front.thickness);
+  check_given_viscosities(comm, scene_.mesh, mixture_->fluids());
   thin_ = find_thin_sections(scene_);
   warn_of(thin_);
   if (!settings.common.probes.empty()) {

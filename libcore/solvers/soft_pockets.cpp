@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "mesh/simplex.hpp"
+#include "solvers/viscosity_range.hpp"
 
 namespace malleus {
 namespace {
@@ -21,15 +22,7 @@ std::size_t index(LocalId i) {
 
 /// Below this an element is soft. Collective.
 Real soft_limit(const LinearSystem& system) {
-  Real low = std::numeric_limits<Real>::max();
-  Real high = 0;
-  for (const Real viscosity : system.element_viscosity) {
-    if (viscosity <= 0) continue;
-    low = std::min(low, viscosity);
-    high = std::max(high, viscosity);
-  }
-  low = system.comm->min(low);
-  high = system.comm->max(high);
+  const auto [low, high] = viscosity_range(system);
   if (!(low < softness * high)) return 0;
   const Real middle = std::sqrt(low) * std::sqrt(high);
   std::array<Real, 2> sums{};

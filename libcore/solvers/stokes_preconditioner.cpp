@@ -8,6 +8,7 @@
 
 #include "solvers/bordered_preconditioner.hpp"
 #include "solvers/gamg_velocity.hpp"
+#include "solvers/viscosity_range.hpp"
 
 namespace malleus {
 namespace {
@@ -17,19 +18,6 @@ constexpr Real double_contrast = 1e6;
 
 std::size_t index(LocalId i) {
   return static_cast<std::size_t>(i);
-}
-
-Real viscosity_contrast(const LinearSystem& system) {
-  Real low = std::numeric_limits<Real>::max();
-  Real high = 0;
-  for (const Real viscosity : system.element_viscosity) {
-    if (viscosity <= 0) continue;
-    low = std::min(low, viscosity);
-    high = std::max(high, viscosity);
-  }
-  low = system.comm->min(low);
-  high = system.comm->max(high);
-  return high > 0 ? high / low : 1.0;
 }
 
 /// The finest level of the velocity block; takes the values and copies layout and graph.
@@ -51,7 +39,7 @@ MultigridLevel finest_level(const LinearSystem& system, StokesBlocks& blocks) {
 }  // namespace
 
 PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSystem& system) {
-  const Real contrast = viscosity_contrast(system);
+  const Real contrast = viscosity_range(system).contrast();
   if (settings.modes == CoarseModes::automatic) {
     settings.modes = contrast > rigid_contrast ? CoarseModes::rigid : CoarseModes::translations;
   }

@@ -125,7 +125,7 @@ class Texts(unittest.TestCase):
 
 
 class WrongInput(unittest.TestCase):
-    def check_refused(self, program, text, expected, arguments=(), ranks=1):
+    def check_refused(self, program, text, expected, arguments=(), ranks=1, before_the_run=True):
         """expected: texts that the message holds; {n}: the number of the line that starts with `>` in text."""
         lines = text.splitlines()
         marked = [i for i, line in enumerate(lines, 1) if line.startswith(">")]
@@ -137,6 +137,8 @@ class WrongInput(unittest.TestCase):
             self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
             for part in expected:
                 self.assertIn(part.format(n=marked[0] if marked else 0), result.stderr)
+            if not before_the_run:
+                return
             self.assertEqual(sorted(path.name for path in pathlib.Path(directory).iterdir()), ["case.ini", "square.msh"],
                              "a refused case writes nothing")
 
@@ -186,6 +188,19 @@ class WrongInput(unittest.TestCase):
                         text = case.replace(f"[{body}]", f"[{body}]\ndensity = 1 kg/m3")
                     self.check_refused(program, text + lines, [expected])
 
+    def test_formulas_without_a_finite_value_are_refused_on_any_number_of_ranks(self):
+        for program in PROGRAMS:
+            cases = {"[body_force]\n>x = \"1/(x-x)\"": "case.ini:{n}: [body_force] x: expression '1/(x-x)' gives "}
+            if program == "inject":
+                viscosity = CASES[program].replace("viscosity = 10 Pa.s", ">viscosity = \"{}\"")
+                cases[viscosity.format("sqrt(x-5)")] = "case.ini:{n}: [fluid.melt] viscosity: expression 'sqrt(x-5)' gives "
+                cases[viscosity.format("x-5")] = "a viscosity is above zero"
+            for lines, expected in cases.items():
+                text = lines if "[mesh]" in lines else CASES[program] + lines
+                for ranks in (1, 3):
+                    with self.subTest(program=program, lines=lines, ranks=ranks):
+                        self.check_refused(program, text, [expected], ranks=ranks, before_the_run=False)
+
     def test_command_line_mistakes(self):
         for program in PROGRAMS:
             case = CASES[program]
@@ -214,7 +229,7 @@ class WrongInput(unittest.TestCase):
 
     def test_broken_meshes_are_refused_with_their_name(self):
         for program in PROGRAMS:
-            for content in (b"", b"no mesh", MESH[: len(MESH) // 2].encode(), os.urandom(2000)):
+            for content in (b"", b"no mesh", MESH[: len(MESH) // 2].encode(), bytes(range(256)) * 8):
                 with self.subTest(program=program, content=content[:20]), tempfile.TemporaryDirectory() as directory:
                     (pathlib.Path(directory) / "square.msh").write_bytes(content)
                     case = pathlib.Path(directory) / "case.ini"
