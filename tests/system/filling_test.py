@@ -1,0 +1,187 @@
+"""Filling against closed forms, through the executable.
+
+Between plates at the distance H, a flow U on average loses dp/dx = 12 eta U / H^2; while polymer drives air out, the pressure
+at a gate of constant flow grows by dp/dx U a second.
+"""
+import csv
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+from box_msh import BoxMesh
+from runs import history, run, summary
+
+ETA, U, H = 1000.0, 0.02, 0.004
+SLOPE = 12 * ETA * U / H ** 2  # Pa/m
+
+CHANNEL = f"""[mesh]
+file = channel.msh
+[fluid.polymer]
+viscosity = {ETA}
+[inlet.gate]
+group = cavity_x_low
+fluid = polymer
+flow_rate = {U * H}
+[vent.outlet]
+group = cavity_x_high
+[wall.lower]
+group = cavity_y_low
+[wall.upper]
+group = cavity_y_high
+"""
+AIR = "[fluid.air]\nviscosity = 0.1\n[initial]\nfluid = air\n[initial.start]\nfluid = polymer\nlevel_set = \"0.004 - x\"\n"
+
+
+def channel_mesh(path, across, length=4.0):
+    """length: in heights."""
+    mesh = BoxMesh(2)
+    mesh.add("cavity", [0.0, 0.0], [length * H, H], [max(4, int(length * across)), across])
+    mesh.write(path)
+
+
+def probe(output, name, column):
+    with open(pathlib.Path(output) / f"probe-{name}.csv") as file:
+        return [float(row[column]) for row in csv.DictReader(file)]
+
+
+class Filling(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.directory = pathlib.Path(scratch.name)
+
+    def case(self, text, name="case"):
+        path = self.directory / f"{name}.ini"
+        path.write_text(text)
+        return path
+
+    def test_pressure_drop_of_thin_sections(self):
+        """On unstructured triangles, those of the shipped channel."""
+        shipped = pathlib.Path(os.environ["MALLEUS_SOURCE"]) / "cases" / "channel"
+        case = self.case((shipped / "steady.ini").read_text())
+        for across, tolerance in ((2, 0.31), (3, 0.08), (4, 0.036), (6, 0.022), (8, 0.012)):
+            with self.subTest(across=across):
+                subprocess.run([shipped / "mesh", "--across", str(across), "-o", self.directory / "channel.msh"], check=True,
+                               capture_output=True)
+                output = self.directory / f"steady-{across}"
+                run("inject", case, output)
+                drop = probe(output, "first", "pressure")[0] - probe(output, "second", "pressure")[0]
+                self.assertLess(abs(drop / (SLOPE * 5 * H) - 1), tolerance)
+                row = history(output)[0]
+                self.assertAlmostEqual(row["flow_gate_m3_s"] / (U * H), 1, 5)
+                thin = [w for w in summary(output)["warnings"] if "elements across" in w]
+                self.assertEqual(bool(thin), across < 4)
+
+    def fill(self, name, *options, ranks=1):
+        output = self.directory / name
+        run("inject", self.case(CHANNEL + AIR + "[time]\nend = 0.35\n"), output, *options, ranks=ranks)
+        return output
+
+    def test_gate_pressure_grows_by_the_closed_form_and_volume_is_what_came_in(self):
+        channel_mesh(self.directory / "channel.msh", 8)
+        rows = history(self.fill("one"))
+        late = [row for row in rows if row["time_s"] > 0.1]
+        slope = np.polyfit([row["time_s"] - row["dt_s"] for row in late], [row["pressure_gate_Pa"] for row in late], 1)[0]
+        self.assertLess(abs(slope / (SLOPE * U) - 1), 0.08)
+        for row in rows:
+            self.assertLess(abs(row["volume_error"]), 1e-9)
+            self.assertAlmostEqual(row["injected_m3"] / (U * H * row["time_s"]), 1, 6)
+        three = history(self.fill("three", ranks=3))
+        self.assertLess(abs(three[-1]["pressure_gate_Pa"] / rows[-1]["pressure_gate_Pa"] - 1), 0.01)
+        self.assertAlmostEqual(three[-1]["fill_fraction"], rows[-1]["fill_fraction"], 7)
+
+    def test_the_same_run_gives_the_same_bytes(self):
+        channel_mesh(self.directory / "channel.msh", 4)
+        states = []
+        for name in ("first", "second"):
+            output = self.fill(name, "-D", "time.increments=4", "-D", "output.every=100", ranks=2)
+            states.append([path.read_bytes() for path in sorted((output / "case.fields").iterdir())])
+        self.assertEqual(*states)
+
+    def test_a_restart_goes_on_where_the_run_stopped(self):
+        channel_mesh(self.directory / "channel.msh", 4)
+        whole = history(self.fill("whole", "-D", "time.increments=6"))
+        self.fill("parts", "-D", "time.increments=6", "--steps", "3")
+        parts = history(self.fill("parts", "-D", "time.increments=6", "--restart"))
+        self.assertEqual([row["increment"] for row in parts], [1, 2, 3, 4, 5, 6])
+        for a, b in zip(whole, parts):
+            self.assertLess(abs(a["pressure_gate_Pa"] / b["pressure_gate_Pa"] - 1), 1e-3)
+            self.assertLess(abs(a["fill_fraction"] / b["fill_fraction"] - 1), 1e-3)
+
+    def test_a_cavity_fills_to_its_end(self):
+        channel_mesh(self.directory / "channel.msh", 4, length=2.0)
+        text = CHANNEL.replace("[wall.lower]", "[wall.lower]\ncondition = slip") + AIR
+        output = self.directory / "full"
+        run("inject", self.case(text), output)
+        last = history(output)[-1]
+        self.assertGreater(last["fill_fraction"], 0.96)
+        self.assertLess(abs(last["volume_error"]), 1e-3)
+        self.assertRegex(summary(output)["reason"], "cavity full|short shot")
+
+    def test_gates_switch_over_at_a_pressure(self):
+        channel_mesh(self.directory / "channel.msh", 4)
+        output = self.directory / "switch"
+        text = CHANNEL.replace("flow_rate", "switch_pressure = 100 kPa\nthen_pressure = 100 kPa\nflow_rate") + AIR
+        run("inject", self.case(text + "[time]\nend = 0.4\n"), output)
+        rows = history(output)
+        before = [row for row in rows if row["pressure_gate_Pa"] < 1e5]
+        after = rows[len(before):]
+        self.assertTrue(before and after)
+        for row in after:
+            self.assertAlmostEqual(row["pressure_gate_Pa"], 1e5)
+        self.assertLess(after[-1]["flow_gate_m3_s"], 0.9 * U * H)
+
+    def test_a_prescribed_flow_moves_the_front_alone(self):
+        mesh = BoxMesh(2)
+        mesh.add("box", [0.0, 0.0], [1.0, 1.0], [32, 32])
+        mesh.write(self.directory / "box.msh")
+        text = """[mesh]
+file = box.msh
+[time]
+end = 2
+[fluid.polymer]
+viscosity = 1
+[fluid.air]
+viscosity = 1
+[initial]
+fluid = air
+[initial.disc]
+fluid = polymer
+shape = sphere
+center = 0.5 0.75
+radius = 0.15
+[flow]
+prescribed_x = "-sin(pi*x)^2*sin(2*pi*y)*cos(pi*t/2)"
+prescribed_y = "sin(pi*y)^2*sin(2*pi*x)*cos(pi*t/2)"
+[reference]
+level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
+"""
+        output = self.directory / "vortex"
+        run("inject", self.case(text), output, ranks=2)
+        self.assertEqual(summary(output)["components"].keys() & {"flow", "front", "filling"}, {"flow", "front", "filling"})
+        self.assertLess(summary(output)["accuracy"]["errors"]["level_set_l1_relative"], 0.08)
+        self.assertAlmostEqual(history(output)[-1]["fill_fraction"], history(output)[0]["fill_fraction"], 9)
+
+    def test_wrong_cases_end_with_2_and_say_why(self):
+        channel_mesh(self.directory / "channel.msh", 4)
+        whole = CHANNEL + AIR
+        for change, words in ((("[vent.outlet]", "[wall.outlet]"), "sealed"),
+                              (("[vent.outlet]\ngroup = cavity_x_high\n", ""), "cavity_x_high"),
+                              (("fluid = polymer", "fluid = polymr"), "did you mean 'polymer'"),
+                              (("flow_rate", "pressure = 1e5\nflow_rate"), "one of velocity, flow_rate and pressure"),
+                              (("group = cavity_y_high", "group = cavity_y_low"), "already"),
+                              (("fluid = air", "fluid = polymer"), "fills the cavity already")):
+            with self.subTest(words=words):
+                self.assertIn(change[0], whole)
+                for ranks in (1, 2):
+                    ended = run("inject", self.case(whole.replace(*change, 1)), self.directory / "wrong", ranks=ranks, check=False)
+                    self.assertEqual(ended.returncode, 2, ended.stderr)
+                    self.assertIn(words, ended.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
