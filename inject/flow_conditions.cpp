@@ -293,8 +293,8 @@ std::vector<GateDrive> asked_drives(const Scene& scene, Real time) {
 FlowConditions make_conditions(const Scene& scene, const Mixture& mixture, const std::vector<GateDrive>& drives,
                                const StickingNodes& sticking, Real time) {
   FlowConditions conditions;
+  conditions.loads = make_loads(scene, mixture, drives, time);  // first: mistakes of formulas before those of gates
   conditions.constraints = impose(scene, drives, sticking, time);
-  conditions.loads = make_loads(scene, mixture, drives, time);
   for (const BoundaryPart* part : scene.parts_of(BoundaryPart::Kind::inlet)) {
     const GateDrive& drive = drives[part->index];
     if (drive.kind != GateDrive::Kind::flow_rate) continue;
