@@ -9,6 +9,7 @@
 #include "base/log.hpp"
 #include "fem/cut_simplex.hpp"
 #include "fem/level_set_volume.hpp"
+#include "solvers/level_set_pockets.hpp"
 #include "solvers/level_set_redistance.hpp"
 
 namespace malleus::inject {
@@ -69,6 +70,20 @@ void Front::rebuild() {
   options.narrow_band = front.narrow_band.value_or(0);
   transport_ = std::make_unique<LevelSetTransport>(scene_.comm, scene_.mesh, scene_.graph, options);
   wetting_ = std::make_unique<WallWetting>(scene_.comm, scene_.mesh, scene_.graph, wetted_nodes());
+  open_ = open_nodes();
+}
+
+/// Nodes of gates, vents and imposed flow: there air comes in or goes out.
+std::vector<char> Front::open_nodes() const {
+  std::vector<char> open(static_cast<std::size_t>(scene_.mesh.nodes()), 0);
+  for (const BoundaryPart& part : scene_.parts) {
+    using Kind = BoundaryPart::Kind;
+    if (part.kind != Kind::inlet && part.kind != Kind::vent && part.kind != Kind::imposed) continue;
+    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
+      if (part.normals->holds(node)) open[static_cast<std::size_t>(node)] = 1;
+    }
+  }
+  return open;
 }
 
 /// Nodes of the walls on which fluid stands still, those of gates apart: there the level set is imposed.
@@ -144,6 +159,7 @@ Outcome Front::substep(Real start, Real dt) {
     const TransportReport report = transport_->advance(velocity, level_set, dt, imposed(i, dt));
     if (!report.converged) return Outcome::retry("the transport of the front did not converge");
     wetting_->apply(level_set);
+    pockets_filled_ += fill_unresolved_pockets(scene_.comm, scene_.mesh, open_, level_set);
     const bool may_redistance = scene_.settings.front.redistance == FrontSettings::Redistance::on_demand;
     if (may_redistance && should_redistance(front_slope(scene_.comm, scene_.mesh, level_set))) {
       redistance(scene_.comm, scene_.mesh, scene_.graph, scene_.measures, level_set);
@@ -257,12 +273,13 @@ void Front::roll_back() {
 }
 
 nlohmann::json Front::save() const {
-  return {{"targets", targets_}, {"redistances", redistances_}};
+  return {{"targets", targets_}, {"redistances", redistances_}, {"pockets_filled", pockets_filled_}};
 }
 
 void Front::load(const nlohmann::json& saved) {
   targets_ = saved.at("targets").get<std::vector<Real>>();
   redistances_ = saved.at("redistances");
+  pockets_filled_ = saved.at("pockets_filled");
 }
 
 }  // namespace malleus::inject

@@ -34,8 +34,9 @@ class Front final : public Component {
 
   /// Elements a second that the front crosses at the present flow. Collective.
   Real rate();
-  int substeps() const { return substeps_; }             ///< of the last increment
-  GlobalId redistances() const { return redistances_; }  ///< since the start
+  int substeps() const { return substeps_; }                   ///< of the last increment
+  GlobalId redistances() const { return redistances_; }        ///< since the start
+  GlobalId pockets_filled() const { return pockets_filled_; }  ///< too small for the mesh; since the start
   GlobalId blocked_nodes() const { return wetting_->nodes_without_interior(); }
   nlohmann::json save() const;
   void load(const nlohmann::json& saved);
@@ -49,6 +50,7 @@ class Front final : public Component {
   Exchange exchange(std::size_t front) const;
   ImposedLevelSet imposed(std::size_t front, Real dt) const;
   std::vector<char> wetted_nodes() const;
+  std::vector<char> open_nodes() const;
   Outcome substep(Real start, Real dt);
   void mark_fill_time(const std::vector<Real>& before, Real start, Real dt);
   std::vector<Real> union_of_fronts() const;
@@ -63,6 +65,8 @@ class Front final : public Component {
   std::vector<Real> targets_;  ///< volume of each fluid, m^3
   int substeps_ = 0;
   GlobalId redistances_ = 0;
+  GlobalId pockets_filled_ = 0;
+  std::vector<char> open_;  ///< [node], where air can come in or go out
 
   std::vector<std::vector<Real>> saved_level_sets_;  ///< before the increment, for roll_back()
   std::vector<Real> saved_fill_time_;

@@ -218,6 +218,9 @@ std::vector<std::string> FillingProcess::closing_lines() {
   lines.push_back(
       fmt::format("filled {:.4f} of the cavity; {} flow solves, {} redistances; left through vents {:.4g} m^3",
                   filling_->fill_fraction(), state_.flow_solves, front_->redistances(), state_.left));
+  if (front_->pockets_filled() > 0) {
+    lines.push_back(fmt::format("{} pockets of air too small for the mesh were filled", front_->pockets_filled()));
+  }
   if (flow_) {
     lines.push_back(fmt::format("keeping the flow between solves moved the front by {:.2g} elements in all",
                                 flow_->freezing_error()));

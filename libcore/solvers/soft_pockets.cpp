@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "mesh/node_regions.hpp"
 #include "mesh/simplex.hpp"
 #include "solvers/viscosity_range.hpp"
 
@@ -13,8 +13,6 @@ namespace malleus {
 namespace {
 
 constexpr Real softness = 1.0 / 30.0;
-constexpr Real no_label = std::numeric_limits<Real>::max();
-constexpr GlobalId most_pockets = 10'000;  ///< beyond, the sums over pockets would cost more than they save
 
 std::size_t index(LocalId i) {
   return static_cast<std::size_t>(i);
@@ -40,9 +38,8 @@ class PocketFinder {
   PocketFinder(const LinearSystem& system, Real limit) : system_(system), mesh_(*system.mesh), limit_(limit) {}
 
   SoftPockets run() {
-    label_nodes();
-    number_regions();
-    if (labels_.empty()) return {};
+    find_regions();
+    if (count_ == 0) return {};
     measure();
     return keep_pockets(find_vented());
   }
@@ -54,84 +51,40 @@ class PocketFinder {
   }
   bool is_firm(LocalId element) const { return system_.element_viscosity[index(element)] >= limit_; }
 
-  /// label_: [node] the least global number of a node of its soft region.
-  void label_nodes() {
-    label_.assign(index(mesh_.nodes()), no_label);
-    std::vector<LocalId> parent(index(mesh_.nodes()));
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root_of = [&](LocalId node) {
-      while (parent[index(node)] != node) node = parent[index(node)] = parent[index(parent[index(node)])];
-      return node;
-    };
-    for (LocalId element = 0; element < mesh_.elements(); ++element) {
-      if (!is_soft(element)) continue;
-      const auto nodes = mesh_.nodes_of_element(element);
-      for (const LocalId node : nodes) {
-        label_[index(node)] = static_cast<Real>(mesh_.global_node(node));
-        parent[index(root_of(node))] = root_of(nodes[0]);
-      }
-    }
-    // Within a rank in one sweep; from rank to rank until nothing changes.
-    std::vector<Real> before;
-    do {
-      before = label_;
-      for (LocalId node = 0; node < mesh_.nodes(); ++node) {
-        Real& least = label_[index(root_of(node))];
-        least = std::min(least, label_[index(node)]);
-      }
-      for (LocalId node = 0; node < mesh_.nodes(); ++node) label_[index(node)] = label_[index(root_of(node))];
-      mesh_.node_halo.min_to_owners(std::span(label_), 1);
-      mesh_.node_halo.update_copies(std::span(label_), 1);
-    } while (system_.comm->any(before != label_));
-  }
-
-  /// labels_: of all regions, increasing, on all ranks. region_: [node] place in labels_, -1 = none.
-  void number_regions() {
-    std::vector<GlobalId> mine;
-    for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) {
-      if (label_[index(node)] == static_cast<Real>(mesh_.global_node(node))) mine.push_back(mesh_.global_node(node));
-    }
-    const auto count = static_cast<GlobalId>(mine.size());
-    const GlobalId total = system_.comm->sum(count);
-    if (total == 0 || total > most_pockets) return;
-    labels_.assign(static_cast<std::size_t>(total), 0);
-    const GlobalId first = system_.comm->sum_of_lower_ranks(count);
-    std::copy(mine.begin(), mine.end(), labels_.begin() + first);
-    system_.comm->sum_in_place(std::span(labels_));
-    region_.resize(label_.size());
-    std::transform(label_.begin(), label_.end(), region_.begin(), [&](Real label) {
-      if (label == no_label) return -1;
-      const auto place = std::lower_bound(labels_.begin(), labels_.end(), static_cast<GlobalId>(label));
-      return static_cast<std::int32_t>(place - labels_.begin());
+  void find_regions() {
+    const std::span<const LocalId> nothing;
+    regions_ = connected_regions(*system_.comm, mesh_, [&](LocalId element) {
+      return is_soft(element) ? std::span<const LocalId>(mesh_.nodes_of_element(element)) : nothing;
     });
+    count_ = static_cast<std::size_t>(regions_.count);
   }
 
   /// Volumes, numbers of nodes and the viscosities around the regions; where firm elements are.
   void measure() {
-    volume_.assign(labels_.size(), 0.0);
-    nodes_.assign(labels_.size(), 0.0);
-    std::vector<Real> around(2 * labels_.size(), 0.0);  // [region] volume times log viscosity, volume
+    volume_.assign(count_, 0.0);
+    nodes_.assign(count_, 0.0);
+    std::vector<Real> around(2 * count_, 0.0);  // [region] volume times log viscosity, volume
     touches_firm_.assign(index(mesh_.nodes()), 0.0);
     for (LocalId element = 0; element < mesh_.elements(); ++element) {
       const auto nodes = mesh_.nodes_of_element(element);
       const Real volume = system_.element_volume[index(element)];
-      if (is_soft(element)) volume_[static_cast<std::size_t>(region_[index(nodes[0])])] += volume;
+      if (is_soft(element)) volume_[static_cast<std::size_t>(regions_.of_node[index(nodes[0])])] += volume;
       if (!is_firm(element)) continue;
       for (const LocalId node : nodes) {
         touches_firm_[index(node)] = 1;
-        if (region_[index(node)] < 0) continue;
-        const auto region = static_cast<std::size_t>(region_[index(node)]);
+        if (regions_.of_node[index(node)] < 0) continue;
+        const auto region = static_cast<std::size_t>(regions_.of_node[index(node)]);
         around[2 * region] += volume * std::log(system_.element_viscosity[index(element)]);
         around[2 * region + 1] += volume;
       }
     }
     for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) {
-      if (region_[index(node)] >= 0) nodes_[static_cast<std::size_t>(region_[index(node)])] += 1;
+      if (regions_.of_node[index(node)] >= 0) nodes_[static_cast<std::size_t>(regions_.of_node[index(node)])] += 1;
     }
     for (std::vector<Real>* sums : {&volume_, &nodes_, &around}) system_.comm->sum_in_place(std::span(*sums));
     mesh_.node_halo.max_to_owners(std::span(touches_firm_), 1);
-    outside_.resize(labels_.size());
-    for (std::size_t region = 0; region < labels_.size(); ++region) {
+    outside_.resize(count_);
+    for (std::size_t region = 0; region < count_; ++region) {
       outside_[region] = around[2 * region + 1] > 0 ? std::exp(around[2 * region] / around[2 * region + 1]) : 0;
     }
   }
@@ -155,10 +108,10 @@ class PocketFinder {
       }
     });
     mesh_.node_halo.add_to_owners(std::span(change), mesh_.dim);
-    std::vector<Real> vented(labels_.size(), 0.0);
+    std::vector<Real> vented(count_, 0.0);
     for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) {
-      if (region_[index(node)] < 0 || touches_firm_[index(node)] > 0) continue;
-      const auto region = static_cast<std::size_t>(region_[index(node)]);
+      if (regions_.of_node[index(node)] < 0 || touches_firm_[index(node)] > 0) continue;
+      const auto region = static_cast<std::size_t>(regions_.of_node[index(node)]);
       Real* c = change.data() + index(node) * dim;
       system_.constraints->project(node, c);
       const Real size = std::sqrt(std::inner_product(c, c + dim, c, 0.0));
@@ -176,8 +129,8 @@ class PocketFinder {
     }
     all = system_.comm->sum(all);
     SoftPockets pockets;
-    std::vector<std::int32_t> pocket_of(labels_.size(), -1);
-    for (std::size_t region = 0; region < labels_.size(); ++region) {
+    std::vector<std::int32_t> pocket_of(count_, -1);
+    for (std::size_t region = 0; region < count_; ++region) {
       if (vented[region] > 0 || outside_[region] <= 0 || volume_[region] > 0.5 * all) {
         ++pockets.open;
         continue;
@@ -188,7 +141,7 @@ class PocketFinder {
     }
     pockets.of_node.resize(index(mesh_.owned_nodes()));
     for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) {
-      const std::int32_t region = region_[index(node)];
+      const std::int32_t region = regions_.of_node[index(node)];
       const bool counts = region >= 0 && !system_.constraints->is_pressure_fixed(node);
       pockets.of_node[index(node)] = counts ? pocket_of[static_cast<std::size_t>(region)] : -1;
     }
@@ -198,9 +151,8 @@ class PocketFinder {
   const LinearSystem& system_;
   const Mesh& mesh_;
   Real limit_;
-  std::vector<Real> label_;
-  std::vector<GlobalId> labels_;
-  std::vector<std::int32_t> region_;
+  NodeRegions regions_;
+  std::size_t count_ = 0;
   std::vector<Real> volume_, nodes_, outside_;  ///< [region], on all ranks
   std::vector<Real> touches_firm_;              ///< [owned node] 1 or 0
 };

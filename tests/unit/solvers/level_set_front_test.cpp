@@ -2,6 +2,7 @@
 
 #include "level_set_cases.hpp"
 #include "solvers/facet_distance.hpp"
+#include "solvers/level_set_pockets.hpp"
 #include "solvers/level_set_redistance.hpp"
 #include "solvers/level_set_wetting.hpp"
 
@@ -131,6 +132,52 @@ TEST(Wetting, WithoutAnyInteriorNodeNothingIsGiven) {
   const auto before = level_set;
   wetting.apply(level_set);
   EXPECT_EQ(level_set, before);
+}
+
+/// A large and a small bubble of air inside, a small one at a side.
+struct Bubbles {
+  explicit Bubbles(int dim) : mesh(unit_mesh(dim, 16)) {
+    const Real middle = dim == 3 ? 0.5 : 0;
+    large = {{0.3, 0.5, middle}, 0.2};
+    level_set = at_nodes(mesh, [&](const Position& x) {
+      return -std::max({signed_distance(large, x), signed_distance(Sphere{{0.75, 0.5, middle}, 0.07}, x),
+                        signed_distance(Sphere{{1, 0.8, middle}, 0.07}, x)});
+    });
+    open.assign(level_set.size(), 0);
+  }
+  void open_side() {
+    for (LocalId n = 0; n < mesh.nodes(); ++n) open[static_cast<std::size_t>(n)] = mesh.point(n)[0] > 1 - 1e-9 ? 1 : 0;
+  }
+  Mesh mesh;
+  Sphere large;
+  std::vector<Real> level_set;
+  std::vector<char> open;
+};
+
+TEST(UnresolvedPockets, AreFilledAndLargeOnesKept) {
+  for (const int dim : {2, 3}) {
+    Bubbles scene(dim);
+    const auto before = scene.level_set;
+    EXPECT_EQ(fill_unresolved_pockets(world(), scene.mesh, scene.open, scene.level_set), 2);
+    for (LocalId n = 0; n < scene.mesh.nodes(); ++n) {
+      const auto node = static_cast<std::size_t>(n);
+      if (signed_distance(scene.large, position_of(scene.mesh, n)) > -0.02) {
+        EXPECT_EQ(scene.level_set[node], before[node]);
+      } else {
+        EXPECT_GT(scene.level_set[node], 0);
+        EXPECT_GE(scene.level_set[node], std::abs(before[node]));
+      }
+    }
+    EXPECT_EQ(fill_unresolved_pockets(world(), scene.mesh, scene.open, scene.level_set), 0);
+  }
+}
+
+TEST(UnresolvedPockets, AreLeftWhereAirCanLeave) {
+  for (const int dim : {2, 3}) {
+    Bubbles scene(dim);
+    scene.open_side();
+    EXPECT_EQ(fill_unresolved_pockets(world(), scene.mesh, scene.open, scene.level_set), 1);
+  }
 }
 
 }  // namespace
