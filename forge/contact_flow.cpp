@@ -185,6 +185,8 @@ Outcome ContactFlow::solve(const Stage& stage) {
     std::copy_n(velocity.at(node), dim, unknowns);
     unknowns[dim] = *pressure.at(node);
   }
+  const auto moves = [](Real unknown) { return unknown != 0; };
+  is_cold_ = !scene_.comm->any(std::any_of(state_.nodes.begin(), state_.nodes.end(), moves));
   if (const Outcome outcome = solve_contacts(stage, surface); outcome.kind != Outcome::Kind::done) return outcome;
   measure_forces();
   store_fields();
@@ -201,7 +203,6 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
       return Outcome::done();
     }
     prepare_operator(stage);
-    if (search == 0) start_softly();
     for (int pass = 0;; ++pass) {
       if (const Outcome outcome = run_newton(scene_.solver.newton_tolerance); outcome.kind != Outcome::Kind::done)
         return outcome;
@@ -211,18 +212,6 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
     if (surprise(stage, surface) <= tolerated_surprise) return Outcome::done();
   }
   return Outcome::retry("nodes end within a tool");
-}
-
-/// From rest, which points hold is found with a penalty a hundred times softer and a loose tolerance first.
-void ContactFlow::start_softly() {
-  if (!has_contacts_ || scene_.comm->any(!memory_.empty())) return;
-  constexpr Real softening = 1e-2;
-  constexpr Real loose = 1e-2;
-  const std::vector<ContactPoint> points = contact_.points();
-  for (ContactPoint& point : contact_.points()) point.normal.penalty *= softening;
-  const std::vector<Real> start = state_.nodes;
-  if (run_newton(loose).kind != Outcome::Kind::done) state_.nodes = start;
-  contact_.points() = points;
 }
 
 Vector ContactFlow::velocity_of(LocalId node) const {
@@ -299,7 +288,7 @@ void ContactFlow::prepare_operator(const Stage& stage) {
   volume_targets(stage.displacement, loads);
   operator_->set_constraints(scene_.boundaries->constraints(stage.time));
   operator_->set_loads(std::move(loads));
-  std::vector<const ResidualTerm*> terms;
+  std::vector<ResidualTerm*> terms;
   if (has_contacts_) terms.push_back(&contact_);
   operator_->set_terms(std::move(terms));
   operator_->prepare();
@@ -350,9 +339,10 @@ NewtonOutcome ContactFlow::run_newton_once(Real tolerance, Real linear_tolerance
   options.tolerance = tolerance;
   options.linear_tolerance = linear_tolerance;
   options.max_iterations = scene_.solver.max_newton;
-  options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
+  if (is_cold_) options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
   const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
   report_.newton_iterations += outcome.iterations();
+  is_cold_ = is_cold_ && !outcome.converged;
   totals_.linear_solves += outcome.linear_solves;
   totals_.linear_iterations += outcome.linear_iterations;
   totals_.linear_failures += outcome.converged ? 0 : 1;

@@ -92,7 +92,6 @@ class ContactFlow final : public Component {
   bool is_pushed(Real time) const;
   void rest();
   void prepare_operator(const Stage& stage);
-  void start_softly();
   Outcome run_newton(Real tolerance);
   NewtonOutcome run_newton_once(Real tolerance, Real linear_tolerance);
   void volume_targets(const Displacement& displacement, StokesLoads& loads);
@@ -123,6 +122,7 @@ class ContactFlow final : public Component {
   std::vector<Real> gaps_;                    ///< [contact point] m, at the end of the increment
   std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
   bool has_contacts_ = false;                 ///< on any rank
+  bool is_cold_ = true;                       ///< no solution tells Newton's method where to start
   FlowReport report_;
   FlowTotals totals_;
   Saved saved_;

@@ -8,6 +8,8 @@ namespace {
 
 /// Faces of an opponent that differ by less than this cosine are the same in two increments.
 constexpr Real same_face = 0.8;
+/// Nodes nearer than this share of an edge at the start touch.
+constexpr Real touching = 1e-6;
 /// Parts of a node's area that face its opponent less than this share count as this share.
 constexpr Real least_area = 1e-3;
 
@@ -48,7 +50,8 @@ ContactPoint make_point(const ContactScene& scene, std::size_t place, int oppone
   point.normal.penalty = scene.settings.penalty * body.viscosity / body.edge;
   const ContactMemory* memory = recall(scene, point.slave, opponent, meeting.normal);
   point.normal.multiplier = memory != nullptr ? memory->multiplier : 0;
-  point.rubs = memory != nullptr || point.normal.offset - meeting.normal.dot(meeting.guessed_slip) > 0;
+  point.holds = memory != nullptr || meeting.gap <= touching * body.edge;
+  point.rubs = point.holds;
   return point;
 }
 

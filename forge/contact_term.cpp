@@ -47,9 +47,21 @@ Vector ContactTerm::slip(const ContactPoint& point, const NodeSpace& space, std:
   return sum;
 }
 
+void ContactTerm::choose_branches(Branches choice, const NodeSpace& space, std::span<const Real> unknowns) {
+  holds_branches_ = choice != Branches::follow;
+  if (choice != Branches::hold) return;
+  for (ContactPoint& point : points_) point.holds = traction(point, slip(point, space, unknowns)).pressure > 0;
+}
+
+ContactTraction ContactTerm::branch_traction(const ContactPoint& point, const Vector& slip) const {
+  if (!holds_branches_) return traction(point, slip);
+  return contact_traction(point.normal, point.rubs ? point.friction : FrictionTerm{}, slip,
+                          point.holds ? Holding::yes : Holding::no);
+}
+
 void ContactTerm::add_residual(const NodeSpace& space, std::span<const Real> unknowns, std::span<Real> force) const {
   for (const ContactPoint& point : points_) {
-    const ContactTraction at = traction(point, slip(point, space, unknowns));
+    const ContactTraction at = branch_traction(point, slip(point, space, unknowns));
     if (!acts(point, at)) continue;
     const Participants all = participants(point, space);
     for (std::size_t i = 0; i < static_cast<std::size_t>(all.count); ++i) {
@@ -63,7 +75,7 @@ void ContactTerm::add_residual(const NodeSpace& space, std::span<const Real> unk
 
 void ContactTerm::add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const {
   for (const ContactPoint& point : points_) {
-    const ContactTraction at = traction(point, slip(point, space, unknowns));
+    const ContactTraction at = branch_traction(point, slip(point, space, unknowns));
     if (!acts(point, at)) continue;
     const Participants all = participants(point, space);
     for (std::size_t i = 0; i < static_cast<std::size_t>(all.count); ++i) {

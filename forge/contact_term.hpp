@@ -17,6 +17,7 @@ struct ContactPoint {
   NormalTerm normal;
   FrictionTerm friction;                           ///< what it is where the point rubs
   bool rubs = false;                               ///< friction acts in this solve
+  bool holds = false;                              ///< the branch that is held, or the first guess of it
   Vector opponent_velocity = Vector::Zero();       ///< of a rigid opponent there, m/s
   std::array<GlobalId, 3> masters = {-1, -1, -1};  ///< nodes of a deformable opponent's facet; -1: none
   std::array<Real, 3> weights = {0, 0, 0};
@@ -34,9 +35,10 @@ class ContactTerm final : public ResidualTerm {
   void extra_couplings(NodeTuples& tuples) const override;
   void add_residual(const NodeSpace& space, std::span<const Real> unknowns, std::span<Real> force) const override;
   void add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const override;
+  void choose_branches(Branches choice, const NodeSpace& space, std::span<const Real> unknowns) override;
   bool is_linear() const override { return false; }
 
-  /// The traction on the slave at a slip.
+  /// The traction on the slave at a slip, which decides whether it holds.
   static ContactTraction traction(const ContactPoint& point, const Vector& slip) {
     return contact_traction(point.normal, point.rubs ? point.friction : FrictionTerm{}, slip);
   }
@@ -44,11 +46,14 @@ class ContactTerm final : public ResidualTerm {
   Vector slip(const ContactPoint& point, const NodeSpace& space, std::span<const Real> unknowns) const;
 
  private:
+  /// The traction as the held branches have it.
+  ContactTraction branch_traction(const ContactPoint& point, const Vector& slip) const;
   bool acts(const ContactPoint& point, const ContactTraction& traction) const {
-    return point.rubs || traction.pressure > 0;
+    return point.rubs || traction.pressure != 0;
   }
 
   int dim_;
+  bool holds_branches_ = false;
   std::vector<ContactPoint> points_;
 };
 

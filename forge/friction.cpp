@@ -17,11 +17,12 @@ FrictionTerm friction_term(const FrictionSpec& spec, Real consistency, Real shea
   return {};
 }
 
-ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip) {
+ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip,
+                                 Holding holding) {
   ContactTraction result;
   const Vector& n = normal.normal;
   const Real pressure = normal.multiplier + normal.penalty * (normal.offset - n.dot(slip));
-  if (pressure > 0) {
+  if (holding == Holding::yes || (holding == Holding::by_slip && pressure > 0)) {
     result.pressure = pressure;
     result.traction = pressure * n;
     result.derivative = -normal.penalty * n * n.transpose();

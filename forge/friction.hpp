@@ -44,11 +44,17 @@ struct NormalTerm {
 struct ContactTraction {
   Vector traction = Vector::Zero();    ///< Pa, on the slave
   Matrix derivative = Matrix::Zero();  ///< d traction / d dv, Pa.s/m; symmetric, not positive
-  Real pressure = 0;                   ///< Pa, >= 0
+  Real pressure = 0;                   ///< Pa, >= 0 where the slip says whether the point holds
 };
 
+/// Whether a contact point presses: as its slip says, or as it was told.
+enum class Holding { by_slip, yes, no };
+
 /// slip: dv = slave's velocity - velocity of the other side there [m/s]. Friction acts whatever the pressure is: who
-/// solves says which points rub, and looks again after the solve. Else the traction would jump where contact begins.
-ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip);
+/// solves says which points rub, and looks again after the solve. Else the traction would jump where contact begins. A
+/// point told to hold pulls as well: p = multiplier + penalty (offset - normal . dv) of either sign; one told not to
+/// has p = 0.
+ContactTraction contact_traction(const NormalTerm& normal, const FrictionTerm& friction, const Vector& slip,
+                                 Holding holding = Holding::by_slip);
 
 }  // namespace malleus::forge

@@ -25,6 +25,13 @@ class TangentSink {
   SystemMatrix* matrix_;
 };
 
+/// How a term with branches (a contact holds or is open) is evaluated.
+enum class Branches {
+  follow,  ///< each evaluation takes the branches of its own unknowns
+  hold,    ///< from now on those of the unknowns given with the choice: the term is smooth then
+  carry    ///< from now on those held last, or that it was made with
+};
+
 /// Forces on nodes as a function of the velocities and pressures, with their derivative. Each force is added by one
 /// rank only, to any nodes that it holds.
 class ResidualTerm {
@@ -42,6 +49,11 @@ class ResidualTerm {
 
   /// Adds the derivative of add_residual() by the velocities, symmetric positive. Local.
   virtual void add_tangent(const NodeSpace& space, std::span<const Real> unknowns, TangentSink& sink) const = 0;
+
+  /// Chooses how branches are taken; a term without any does nothing. unknowns as in add_residual(). Local.
+  virtual void choose_branches(Branches choice, const NodeSpace& space, std::span<const Real> unknowns) {
+    (void)choice, (void)space, (void)unknowns;
+  }
 
   /// Neither forces nor their derivative depend on the velocity but linearly; the same on all ranks.
   virtual bool is_linear() const { return false; }

@@ -182,8 +182,15 @@ ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& 
   comm_->sum_in_place(squares);
   for (const Real value : result.borders) squares[0] += value * value;
   report.norm = std::sqrt(squares[0]);
+  report.internal = std::sqrt(std::max(squares[1], 1e-18 * squares[3]));
   report.reference = std::sqrt(std::max({squares[1], squares[2], 1e-18 * squares[3]}));
   return report;
+}
+
+void StokesOperator::choose_branches(Branches choice, const StokesState& state) {
+  if (terms_.empty()) return;
+  const std::vector<Real> unknowns = unknowns_in_space(state);
+  for (ResidualTerm* term : terms_) term->choose_branches(choice, *space_, unknowns);
 }
 
 template <class Element>

@@ -242,8 +242,8 @@ void StokesOperator::update_viscosity(const StokesState& state) {
   leave_out_still();
 }
 
-void StokesOperator::update_viscosity(Real uniform_shear_rate) {
-  std::fill(shear_rate_.begin(), shear_rate_.end(), uniform_shear_rate);
+void StokesOperator::update_viscosity(Real start_rate) {
+  model_->start_rates(*mesh_, start_rate, shear_rate_);
   model_->evaluate(*mesh_, shear_rate_, viscosity_, slope_);
   leave_out_still();
 }

@@ -44,6 +44,7 @@ struct FluxGate {
 struct ResidualReport {
   Real norm = 0;       ///< of the scaled residual, borders included
   Real reference = 0;  ///< of the forces that must balance: assembled internal forces or loads, N
+  Real internal = 0;   ///< of the assembled internal forces alone, N
   Real relative() const { return reference > 0 ? norm / reference : norm; }
   /// Where the pressure is free: the net flow that the prescribed velocities demand, less the volume targets. It has
   /// been spread over the domain as a uniform div v. m^3/s, outward; 0 elsewhere.
@@ -75,7 +76,7 @@ class StokesOperator {
   const NodeConstraints& constraints() const noexcept { return constraints_; }
   void set_loads(StokesLoads loads) { loads_ = std::move(loads); }
   void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
-  void set_terms(std::vector<const ResidualTerm*> terms) { terms_ = std::move(terms); }
+  void set_terms(std::vector<ResidualTerm*> terms) { terms_ = std::move(terms); }
   /// Whether elements all of whose nodes are held at rest leave the equations, as if they had no viscosity: nothing
   /// flows there, and their pressure, which the bubbles alone determine, would cost iterations and mean nothing
   /// (sections one element thin). Their other pressures can be filled in by extend_pressure(). Default: they stay.
@@ -96,13 +97,16 @@ class StokesOperator {
   /// Puts the prescribed velocities into a state, and the right number of borders. Local.
   void impose_constraints(StokesState& state) const;
 
-  /// Viscosities of the elements at the state's shear rates, or all at one shear rate [1/s]. Local.
+  /// Viscosities of the elements at the state's shear rates, or at the model's start_rates() for one [1/s]. Local.
   void update_viscosity(const StokesState& state);
-  void update_viscosity(Real uniform_shear_rate);
+  void update_viscosity(Real start_rate);
   std::span<const Real> viscosity() const noexcept { return viscosity_; }    ///< [element], Pa.s
   std::span<const Real> shear_rate() const noexcept { return shear_rate_; }  ///< [element], of the last update, 1/s
   std::span<const Real> volume() const noexcept { return volume_; }          ///< [element], m^3 (ring)
   bool is_linear() const;                                                    ///< one linear solve is exact
+  bool has_terms() const noexcept { return !terms_.empty(); }
+  /// How the terms take their branches from here on; hold: those of this state. Collective.
+  void choose_branches(Branches choice, const StokesState& state);
   Real sensitivity() const { return model_->sensitivity(); }
 
   /// The residual at the current viscosities, scaled and projected as LinearSystem says (the right side of a step is
@@ -167,7 +171,7 @@ class StokesOperator {
   NodeConstraints extended_constraints_;
   StokesLoads loads_;
   std::vector<FluxGate> gates_;
-  std::vector<const ResidualTerm*> terms_;
+  std::vector<ResidualTerm*> terms_;
   bool pressure_is_free_ = false;
 
   bool leaves_out_still_ = false;

@@ -2,6 +2,7 @@
 
 /// The viscosity of every element of the mesh.
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -18,6 +19,11 @@ class ViscosityModel {
   /// (d eta / d gamma) / gamma, Pa.s^3. Local.
   virtual void evaluate(const Mesh& mesh, std::span<const Real> shear_rate, std::span<Real> viscosity,
                         std::span<Real> slope) const = 0;
+  /// The rates [element] at which a first solve takes the viscosities, where nothing is known but a rate of the scene.
+  virtual void start_rates(const Mesh& mesh, Real rate, std::span<Real> shear_rate) const {
+    (void)mesh;
+    std::fill(shear_rate.begin(), shear_rate.end(), rate);
+  }
   /// The smallest of the laws' (see ViscousLaw). The same on all ranks.
   virtual Real sensitivity() const = 0;
   /// No element's viscosity depends on its shear rate. The same on all ranks.
@@ -30,6 +36,9 @@ class RegionViscosity final : public ViscosityModel {
   explicit RegionViscosity(std::vector<std::unique_ptr<const ViscousLaw>> laws) : laws_(std::move(laws)) {}
   void evaluate(const Mesh& mesh, std::span<const Real> shear_rate, std::span<Real> viscosity,
                 std::span<Real> slope) const override;
+  /// The softest region has the rate, the others the rate at which they bear its stress: Newton's method would not find
+  /// soon that a stiff one hardly moves.
+  void start_rates(const Mesh& mesh, Real rate, std::span<Real> shear_rate) const override;
   Real sensitivity() const override;
   bool is_linear() const override;
 

@@ -44,6 +44,8 @@ class Loop {
   Real power_at(const StokesState& start, Real share);
   Real cut_share(const StokesState& start, Real slope);
   Real forcing(Real previous_norm);
+  Real sound_norm() const;
+  void choose_branches(int iteration, bool cold);
   bool reached() const { return report_.norm <= options_.tolerance * report_.reference; }
   void give_up(const std::string& reason);
 
@@ -111,10 +113,30 @@ void Loop::solve_linear_problem() {
   outcome_.converged = true;
 }
 
+/// The residual's norm, without what the penalties of a guess make beyond the forces within the bodies: those go with
+/// the next linear solve, whatever it starts from.
+Real Loop::sound_norm() const {
+  return op_.has_terms() && report_.internal > 0 ? std::min(report_.norm, report_.internal) : report_.norm;
+}
+
+/// While the branches of the terms (which contacts hold) are still sought, each step is made with those of its start:
+/// a smooth problem, whose line search does not stop where a contact closes. This is the active set method; the first
+/// guess brings its own set, as its velocities say less of pressures than the set does. Later each evaluation has its
+/// own branches, and the search on the convex potential ends any cycle.
+void Loop::choose_branches(int iteration, bool cold) {
+  if (!op_.has_terms() || iteration >= options_.set_iterations) return;
+  if (iteration > 0 || cold) {
+    op_.choose_branches(Branches::hold, state_);
+  } else {
+    op_.choose_branches(Branches::carry, state_);
+    evaluate();
+  }
+}
+
 /// Tolerance of the next linear solve; previous_norm: the residual's before the last step, 0 = none.
 Real Loop::forcing(Real previous_norm) {
   if (previous_norm > 0) {
-    const Real ratio = report_.norm / previous_norm;
+    const Real ratio = sound_norm() / previous_norm;
     const Real guard = forcing_factor * forcing_ * forcing_;
     forcing_ = std::min(loosest_forcing, forcing_factor * ratio * ratio);
     if (guard > 0.1) forcing_ = std::max(forcing_, guard);
@@ -191,15 +213,20 @@ void Loop::solve_nonlinear_problem() {
       outcome_.converged = true;
       return;
     }
+    choose_branches(iteration, cold);
     const bool newton = !first && picard_left <= 0;
     if (!first && !newton) --picard_left;
     const Real tolerance = newton ? forcing(previous_norm) : loosest_forcing;
-    previous_norm = newton ? report_.norm : 0;
-    if (!compute_step(newton, tolerance)) return;
+    previous_norm = newton ? sound_norm() : 0;
+    if (!compute_step(newton, tolerance * sound_norm() / report_.norm)) return;
     if (!search(newton)) {
       picard_left = 1;
       previous_norm = 0;
     }
+    if (!op_.has_terms()) continue;
+    op_.choose_branches(Branches::follow, state_);
+    evaluate();
+    outcome_.history.back().residual = report_.relative();
   }
   outcome_.converged = reached();
   if (!outcome_.converged) give_up("no convergence");

@@ -14,6 +14,7 @@ struct NewtonOptions {
   Real linear_tolerance = 1e-6;  ///< of linear problems, and of the last linear solve of the loop
   int max_iterations = 40;       ///< Picard steps counted
   int max_cuts = 8;              ///< of one step by the line search
+  int set_iterations = 15;       ///< in which each step holds the branches of terms (contacts) as they are at its start
   /// Shear rate [1/s] at which viscosities are taken for the first step from a cold start; 0 = take the start state's.
   Real start_shear_rate = 0;
 };
@@ -54,6 +55,10 @@ struct NewtonOutcome {
 /// exact as the progress warrants (Eisenstat and Walker 1996, choice 2), the last one to linear_tolerance of the whole.
 /// Measured on a block of 512 triangles between sticking platens, from a cold start to 1e-6, cut-off 1e-2 V/H: 5, 8,
 /// 11, 12, 13 iterations at m = 0.5, 0.3, 0.1, 0.05, 0.02.
+///
+/// Terms with branches (contacts) are solved by an active set: each step is made with the branches of its start, from a
+/// warm start with those that the terms carry from the last increment; convergence is judged without that. Three bodies
+/// in contact (cases/press, 695 nodes, to 1e-6): 4 to 5 iterations an increment, 8 to 13 with the plus function alone.
 class NewtonSolver {
  public:
   explicit NewtonSolver(NewtonOptions options) : options_(options) {}

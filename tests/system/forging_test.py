@@ -211,6 +211,15 @@ class Contact(Forging):
             for row, expected in zip(rows, reference):
                 self.assertAlmostEqual(row["force_lower_y_N"] / expected["force_lower_y_N"], 1, delta=1e-5)
 
+    def test_a_warm_start_knows_the_contacts(self):
+        # Sliding blocks that stick hard: the contacts of the last increment are a guess that Newton hardly mends.
+        for dim, lower, upper in ((2, (4, 4), (7, 7)), (3, (2, 2, 2), (3, 3, 3))):
+            text = self.blocks(dim, lower, upper, time="increments = 4\nstep = 0.02", consistency=3 * K)
+            rows = self.forge(text.replace("slave = upper\n", "slave = upper\nfriction = 1000\n"))
+            self.assertLessEqual(rows[0]["newton_iterations"], 20)  # two solves from a cold start
+            for row in rows[1:]:
+                self.assertLessEqual(row["newton_iterations"], 6)
+
     def test_friction_between_bodies_balances(self):
         text = self.blocks(2, (4, 4), (6, 6), consistency=3 * K).replace("slave = upper\n", "slave = upper\nfriction = 1\n")
         row = self.forge(text)[0]
