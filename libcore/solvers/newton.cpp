@@ -120,12 +120,13 @@ Real Loop::sound_norm() const {
 }
 
 /// While the branches of the terms (which contacts hold) are still sought, each step is made with those of its start:
-/// a smooth problem, whose line search does not stop where a contact closes. This is the active set method; the first
-/// guess brings its own set, as its velocities say less of pressures than the set does. Later each evaluation has its
-/// own branches, and the search on the convex potential ends any cycle.
+/// a smooth problem, whose line search does not stop where a contact closes. This is the active set method; the set of
+/// a step is that of the whole last step, whatever share of it was taken. A warm start brings its own set, as its
+/// velocities say less of pressures than the set does. Later each evaluation has its own branches, and the search on
+/// the convex potential ends any cycle.
 void Loop::choose_branches(int iteration, bool cold) {
   if (!op_.has_terms() || iteration >= options_.set_iterations) return;
-  if (iteration > 0 || cold) {
+  if (iteration == 0 && cold) {
     op_.choose_branches(Branches::hold, state_);
   } else {
     op_.choose_branches(Branches::carry, state_);
@@ -219,11 +220,14 @@ void Loop::solve_nonlinear_problem() {
     const Real tolerance = newton ? forcing(previous_norm) : loosest_forcing;
     previous_norm = newton ? sound_norm() : 0;
     if (!compute_step(newton, tolerance * sound_norm() / report_.norm)) return;
+    StokesState full = state_;
+    op_.add_step(step_, 1, 1, full);
     if (!search(newton)) {
       picard_left = 1;
       previous_norm = 0;
     }
     if (!op_.has_terms()) continue;
+    op_.choose_branches(Branches::hold, full);
     op_.choose_branches(Branches::follow, state_);
     evaluate();
     outcome_.history.back().residual = report_.relative();
