@@ -40,7 +40,7 @@ struct DiscreteFields {
 };
 
 /// Errors at one time [s], integrals weighted as `geometry` says. Quadrature of degree 5 (values) and 3 (gradients);
-/// the known gradients by central differences over a thousandth of the element. The bubble is left out. The level sets'
+/// the known gradients by central differences over a thousandth of the element. The subscales are left out. The level sets'
 /// signs are compared at 64 points of each element near either front. Elements whose `modelled` entry is 0 are left
 /// out (empty: none). An expression that is not finite inside is an InputError. Collective.
 SolutionErrors solution_errors(const Communicator& comm, const Mesh& mesh, Geometry geometry,

@@ -61,6 +61,14 @@ Eigen::Matrix<Real, 2 * Rows, 6> by_component(const Eigen::Matrix<Real, Rows, 3>
   return result;
 }
 
+/// T of the subscales for eta = 1 without the bubble's part, m^2.
+Eigen::Matrix<Real, 2, 2> beyond_the_bubble(const Gradients& gradients) {
+  constexpr Real bubble_share = 1.0 / 20.0;
+  Eigen::Matrix<Real, 2, 2> stiffness = gradients * gradients.transpose();
+  stiffness.diagonal().array() += stiffness.trace();
+  return (subscale_share<2> - bubble_share) * stiffness.inverse();
+}
+
 }  // namespace
 
 AxisymmetricMiniElement::AxisymmetricMiniElement(const SimplexPoints<2>& points) {
@@ -75,10 +83,12 @@ AxisymmetricMiniElement::AxisymmetricMiniElement(const SimplexPoints<2>& points)
   stiffness_ = ring.stiffness - ring.crossing.transpose() * inverse * ring.crossing;
   divergence_ = ring.divergence - ring.bubble_divergence * inverse * ring.crossing;
   compliance_ = ring.bubble_divergence * inverse * ring.bubble_divergence.transpose();
+  const Eigen::Matrix<Real, 3, 2> beyond = -geometry.gradients.transpose() * beyond_the_bubble(geometry.gradients);
+  compliance_ -= ring.volume * beyond * geometry.gradients;
   const Eigen::Matrix<Real, 2, 6> bubble_force = by_component<1>(ring.bubble_mass.transpose());
   force_load_ = by_component<3>(ring.mass) - ring.crossing.transpose() * inverse * bubble_force;
-  bubble_load_ = ring.bubble_divergence * inverse * bubble_force;
   ring_ = ring.mass.rowwise().sum();
+  bubble_load_ = ring.bubble_divergence * inverse * bubble_force - beyond * by_component<1>(ring_.transpose());
   volume_ = ring.volume;
 }
 

@@ -4,25 +4,14 @@
 
 namespace malleus {
 
-namespace {
-
-/// Integral of the bubble and of |d b|^2's constant k over the volume (exact: products of barycentric coordinates).
-template <int D>
-constexpr Real bubble_share = D == 2 ? 9.0 / 20.0 : 32.0 / 105.0;
-template <int D>
-constexpr Real bubble_stiffness = D == 2 ? 81.0 / 20.0 : 4096.0 / 945.0;
-
-}  // namespace
-
 template <int D>
 MiniElement<D>::MiniElement(const SimplexPoints<D>& points) {
   const P1Gradients<D> geometry = p1_gradients<D>(points);
   gradients_ = geometry.gradients;
   volume_ = geometry.volume;
-  bubble_ = bubble_share<D> * volume_;
   Eigen::Matrix<Real, D, D> stiffness = gradients_ * gradients_.transpose();
   stiffness.diagonal().array() += stiffness.trace();
-  bubble_inverse_ = stiffness.inverse() / (bubble_stiffness<D> * volume_);
+  subscale_ = subscale_share<D> * volume_ * stiffness.inverse();
 }
 
 template <int D>
@@ -45,7 +34,7 @@ ElementUnknowns<D> MiniElement<D>::residual(const ElementUnknowns<D>& unknowns, 
   stress.diagonal().array() -= unknowns.pressure.mean();
   result.velocity = volume_ * stress * gradients_;
   const Eigen::Matrix<Real, D, 1> slope = gradients_ * unknowns.pressure;
-  result.pressure = (-bubble_ * bubble_ / bubble_viscosity) * (gradients_.transpose() * (bubble_inverse_ * slope));
+  result.pressure = (-1 / bubble_viscosity) * (gradients_.transpose() * (subscale_ * slope));
   result.pressure.array() -= volume_ / (D + 1) * rate.trace();
   return result;
 }
@@ -55,10 +44,9 @@ ElementUnknowns<D> MiniElement<D>::load(const ElementLoad<D>& load, Real bubble_
   const Real share = volume_ / (D + 1);
   const Eigen::Matrix<Real, D, 1> total = load.force.rowwise().sum();
   ElementUnknowns<D> result;
-  // integral of phi_a phi_b: V/((D+1)(D+2)) (1 + delta_ab); of phi_a b: s/(D+1)
+  // integral of phi_a phi_b: V/((D+1)(D+2)) (1 + delta_ab)
   result.velocity = share / (D + 2) * (load.force.colwise() + total);
-  result.pressure =
-      (-bubble_ * bubble_ / bubble_viscosity / (D + 1)) * (gradients_.transpose() * (bubble_inverse_ * total));
+  result.pressure = (-1 / bubble_viscosity / (D + 1)) * (gradients_.transpose() * (subscale_ * total));
   result.pressure.array() -= share * load.divergence;
   return result;
 }
@@ -68,8 +56,7 @@ void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real 
                             ElementMatrix<D>& result) const {
   const Eigen::Matrix<Real, D, D + 1> stress_gradients = viscosity * volume_ * gradients_;
   const Eigen::Matrix<Real, D, D + 1> coupling = -scale * volume_ / (D + 1) * gradients_;
-  const Eigen::Matrix<Real, D, D + 1> bubble_gradients =
-      (-scale * scale * bubble_ * bubble_ / viscosity) * (bubble_inverse_ * gradients_);
+  const Eigen::Matrix<Real, D, D + 1> subscale_gradients = (-scale * scale / viscosity) * (subscale_ * gradients_);
   Eigen::Matrix<Real, D, D + 1> rate_gradients;
   if (slope != 0) rate_gradients = 2 * volume_ * (strain_rate(velocity) * gradients_);
   for (int a = 0; a <= D; ++a) {
@@ -81,7 +68,7 @@ void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real 
       if (slope != 0) viscous += (slope / volume_) * rate_gradients.col(a) * rate_gradients.col(b).transpose();
       block.template topRightCorner<D, 1>() = coupling.col(a);
       block.template bottomLeftCorner<1, D>() = coupling.col(b).transpose();
-      block(D, D) = gradients_.col(a).dot(bubble_gradients.col(b));
+      block(D, D) = gradients_.col(a).dot(subscale_gradients.col(b));
       if (a != b) result.blocks[static_cast<std::size_t>(b)][static_cast<std::size_t>(a)] = block.transpose();
     }
   }

@@ -78,7 +78,7 @@ class StokesOperator {
   void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
   void set_terms(std::vector<ResidualTerm*> terms) { terms_ = std::move(terms); }
   /// Whether elements all of whose nodes are held at rest leave the equations, as if they had no viscosity: nothing
-  /// flows there, and their pressure, which the bubbles alone determine, would cost iterations and mean nothing
+  /// flows there, and their pressure, which the subscales alone determine, would cost iterations and mean nothing
   /// (sections one element thin). Their other pressures can be filled in by extend_pressure(). Default: they stay.
   void leave_out_still_elements(bool leave_out) { leaves_out_still_ = leave_out; }
 
@@ -124,7 +124,7 @@ class StokesOperator {
   /// terms, zero at free nodes to the solver's tolerance. Exact: their power is that of the discrete solution.
   /// Collective.
   std::vector<Real> reactions(const StokesState& state);
-  /// Power dissipated by the viscous stress [W], that of the bubbles (pressure times C times pressure) included: equal
+  /// Power dissipated by the viscous stress [W], that of the subscales (pressure times C times pressure) included: equal
   /// to the power of loads and constraints. At the current viscosities. Collective.
   Real dissipation(const StokesState& state) const;
   /// Of a result of residual(). Collective.

@@ -13,20 +13,19 @@ class Strength {
  public:
   Strength(const BlockGraph& graph, const BlockValues<Real>& values, int dim)
       : graph_(graph), squares_(static_cast<std::size_t>(graph.entries())) {
-    std::vector<float> largest(static_cast<std::size_t>(graph.rows()), 0.0F);
+    // In double precision: with viscosities of 1e-8, the products of squares are below what single precision holds.
+    std::vector<Real> largest(static_cast<std::size_t>(graph.rows()), 0);
     for (LocalId row = 0; row < graph.rows(); ++row) {
       for (LocalId k = begin(row); k < end(row); ++k) {
-        const auto square = static_cast<float>(norm_squared(values, k, dim));
-        squares_[static_cast<std::size_t>(k)] = square;
-        if (column(k) != row) largest[index(row)] = std::max(largest[index(row)], square);
+        if (column(k) != row) largest[index(row)] = std::max(largest[index(row)], norm_squared(values, k, dim));
       }
     }
     for (LocalId row = 0; row < graph.rows(); ++row) {
       for (LocalId k = begin(row); k < end(row); ++k) {
         const LocalId j = column(k);
-        float& square = squares_[static_cast<std::size_t>(k)];
-        const bool counts = j != row && j < graph.rows() && square > 0;
-        square = counts ? square / std::sqrt(largest[index(row)] * largest[index(j)]) : 0;
+        if (j == row || j >= graph.rows()) continue;
+        const Real scale = std::sqrt(largest[index(row)]) * std::sqrt(largest[index(j)]);
+        if (scale > 0) squares_[index(k)] = static_cast<float>(norm_squared(values, k, dim) / scale);
       }
     }
   }

@@ -169,30 +169,50 @@ class PlaneElement : public testing::Test {};
 using PlaneElements = testing::Types<MiniElement<2>, MiniElement<3>>;
 TYPED_TEST_SUITE(PlaneElement, PlaneElements);
 
-TYPED_TEST(PlaneElement, BubbleIntegralsAreThoseOfQuadrature) {
-  constexpr int D = TypeParam::dim;
-  const SimplexPoints<D> points = skew_simplex<D>();
-  const P1Gradients<D> geometry = p1_gradients<D>(points);
-  Real integral = 0;
-  Eigen::Matrix<Real, D, D> products = Eigen::Matrix<Real, D, D>::Zero();
-  const Real top = std::pow(D + 1, D + 1);
-  for (const auto& [phi, weight] : simplex_quadrature<D>(5)) {
-    integral += weight * geometry.volume * top * phi.prod();
-    Point<D> gradient = Point<D>::Zero();
-    for (int a = 0; a <= D; ++a) gradient += top * phi.prod() / phi[a] * geometry.gradients.col(a);
-    products += weight * geometry.volume * gradient * gradient.transpose();
+/// A simplex with equal edges of length 1, on a face of it y = 0 (z = 0 in space).
+template <int D>
+SimplexPoints<D> regular_simplex() {
+  SimplexPoints<D> points;
+  if constexpr (D == 2) {
+    points << 0, 1, 0.5, 0, 0, std::sqrt(0.75);
+  } else {
+    const Real third = std::sqrt(1.0 / 12.0);
+    points << 0, 1, 0.5, 0.5, 0, 0, std::sqrt(0.75), third, 0, 0, 0, std::sqrt(2.0 / 3.0);
   }
-  Eigen::Matrix<Real, D, D> stiffness = products;
-  stiffness.diagonal().array() += products.trace();
-  const Eigen::Matrix<Real, D + 1, D + 1> c =
-      integral * integral * geometry.gradients.transpose() * stiffness.inverse() * geometry.gradients;
+  return points;
+}
+
+/// T = d^2 / (12 eta), d the height: what linear functions lose of the flow between parallel plates in a layer.
+TYPED_TEST(PlaneElement, SubscalesCarryWhatALayerLosesOfAChannelsFlow) {
+  constexpr int D = TypeParam::dim;
+  const SimplexPoints<D> points = regular_simplex<D>();
+  const P1Gradients<D> geometry = p1_gradients<D>(points);
+  const Real height = 1 / geometry.gradients.col(0).norm();
+  const Real viscosity = 3;
   ElementMatrix<D> matrix;
-  TypeParam(points).matrix(Eigen::Matrix<Real, D, D + 1>::Zero(), 1, 0, 1, matrix);
+  TypeParam(points).matrix(Eigen::Matrix<Real, D, D + 1>::Zero(), viscosity, 0, 1, matrix);
+  const Real share = geometry.volume * height * height / (12 * viscosity);
   for (int a = 0; a <= D; ++a) {
     for (int b = 0; b <= D; ++b) {
-      EXPECT_NEAR(-matrix.blocks[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)](D, D), c(a, b), 1e-14);
+      const Real c = share * geometry.gradients.col(a).dot(geometry.gradients.col(b));
+      EXPECT_NEAR(-matrix.blocks[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)](D, D), c, 1e-14);
     }
   }
+}
+
+/// In hydrostatic equilibrium (grad p = f) nothing flows, on any element.
+TYPED_TEST(PlaneElement, SubscalesRestInHydrostaticEquilibrium) {
+  constexpr int D = TypeParam::dim;
+  const SimplexPoints<D> points = skew_simplex<D>();
+  const Point<D> force = Point<D>::LinSpaced(D, 1, 3);
+  ElementUnknowns<D> unknowns;
+  unknowns.pressure = points.transpose() * force;
+  ElementLoad<D> load;
+  load.force.colwise() = force;
+  const TypeParam element(points);
+  const auto balance = element.residual(unknowns, 2, 2).pressure - element.load(load, 2).pressure;
+  EXPECT_LT(balance.norm(), 1e-14);
+  EXPECT_GT(element.load(load, 2).pressure.norm(), 1e-4);
 }
 
 TYPED_TEST(PlaneElement, ShearRateOfKnownMotions) {
