@@ -268,7 +268,7 @@ DistributedPiece distribute_mesh(const Communicator& comm, MeshChunk chunk) {
   return result;
 }
 
-Mesh build_mesh(const Communicator& comm, MeshChunk chunk) {
+Mesh build_mesh(const Communicator& comm, MeshChunk chunk, std::vector<GlobalId>* numbers) {
   const std::string source = chunk.source;
   const DistributedPiece distributed = distribute_mesh(comm, std::move(chunk));
   const MeshPiece& piece = distributed.piece;
@@ -279,7 +279,13 @@ Mesh build_mesh(const Communicator& comm, MeshChunk chunk) {
                                  piece.dim == 3 ? "triangles" : "lines", piece.group_names[g],
                                  piece.dim == 3 ? "face of a tetrahedron" : "edge of a triangle"));
   }
-  return assemble_mesh(comm, piece).mesh;
+  AssembledMesh assembled = assemble_mesh(comm, piece);
+  if (numbers != nullptr) {
+    numbers->resize(piece.node_numbers.size());
+    for (std::size_t node = 0; node < piece.node_numbers.size(); ++node)
+      (*numbers)[static_cast<std::size_t>(assembled.node_of_piece[node])] = piece.node_numbers[node];
+  }
+  return std::move(assembled.mesh);
 }
 
 }  // namespace malleus

@@ -48,7 +48,8 @@ struct DistributedPiece {
 /// twice, and where a node is given twice at different places. Collective.
 DistributedPiece distribute_mesh(const Communicator& comm, MeshChunk chunk);
 
-/// distribute_mesh() and assemble_mesh(); loose facets are an InputError. Collective.
-Mesh build_mesh(const Communicator& comm, MeshChunk chunk);
+/// distribute_mesh() and assemble_mesh(); loose facets are an InputError. numbers: if given, receives the node numbers of
+/// the chunks, [node] of the mesh. Collective.
+Mesh build_mesh(const Communicator& comm, MeshChunk chunk, std::vector<GlobalId>* numbers = nullptr);
 
 }  // namespace malleus

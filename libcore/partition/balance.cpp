@@ -24,6 +24,13 @@ std::vector<std::uint64_t> centroid_keys(const Communicator& comm, const Mesh& m
 
 }  // namespace
 
+MigrationReport divide_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields,
+                                   std::span<const GlobalId> weights, int ranks) {
+  std::vector<int> destinations = curve_partition(comm, centroid_keys(comm, mesh), weights);
+  for (int& rank : destinations) rank = static_cast<int>(static_cast<GlobalId>(rank) * ranks / comm.size());
+  return migrate(comm, mesh, fields, destinations);
+}
+
 MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real tolerance) {
   const auto largest = static_cast<Real>(comm.max(static_cast<GlobalId>(mesh.elements())));
   const Real mean = static_cast<Real>(mesh.total_elements) / comm.size();

@@ -6,6 +6,11 @@
 
 namespace malleus {
 
+/// Deals the elements anew in stretches of the space-filling curve of equal weight ([element], >= 0) to the ranks
+/// [0, ranks). Fields follow. Collective.
+MigrationReport divide_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields,
+                                   std::span<const GlobalId> weights, int ranks);
+
 /// Deals the elements anew in equal stretches of the space-filling curve, where the present shares differ by more than
 /// `tolerance` (largest over mean, minus 1) or a rank is empty that need not be. Fields follow. Collective.
 MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real tolerance = 0.05);

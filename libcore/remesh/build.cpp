@@ -125,6 +125,7 @@ void build_elements(const RemeshMesh& input, WorkingMesh<D, Metric>& mesh, Build
     mesh.vertices[v].dimension = D;
     mesh.vertices[v].frozen = !input.frozen.empty() && input.frozen[v] != 0;
     mesh.vertices[v].fixed = mesh.vertices[v].frozen;
+    mesh.vertices[v].origin = static_cast<LocalId>(v);
     if (mesh.vertices[v].element < 0) ++notes.unused_nodes;
   }
 }
@@ -177,7 +178,9 @@ RemeshMesh to_arrays(const WorkingMesh<D, Metric>& mesh) {
   write_facets(mesh, output);
   write_curves(mesh, output);
   bool any_frozen = false;
+  output.origin.reserve(mesh.vertices.size());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    output.origin.push_back(mesh.vertices[v].origin);
     if (mesh.vertices[v].dimension == 0) output.corners.push_back(static_cast<LocalId>(v));
     any_frozen = any_frozen || mesh.vertices[v].frozen;
   }

@@ -172,10 +172,10 @@ Real Cavity<D, Metric>::absolute_volume(const Star<D, Metric>& star, int& invert
 
 template <int D, class Metric>
 bool Cavity<D, Metric>::removes_frozen(const Star<D, Metric>& star) const {
-  for (const auto& face : border_) {
-    if (face.patch != no_patch && mesh_.patch(face.patch).frozen && vanishes(face, star)) return true;
-  }
-  return false;
+  const auto is_lost = [&](const BorderFace<D>& face) {
+    return face.patch != no_patch && mesh_.patch(face.patch).frozen && vanishes(face, star);
+  };
+  return std::any_of(border_.begin(), border_.end(), is_lost) || std::any_of(inner_.begin(), inner_.end(), is_lost);
 }
 
 template <int D, class Metric>

@@ -192,6 +192,7 @@ class Classifier {
     const auto& fa = faces_[static_cast<std::size_t>(a.face)];
     const auto& fb = faces_[static_cast<std::size_t>(b.face)];
     if (fa.kind != fb.kind) return false;
+    if (kinds_[static_cast<std::size_t>(fa.kind)].frozen) return true;
     return -dot(inward(fa, a.key), inward(fb, b.key)) >= straight_;
   }
 
@@ -339,6 +340,7 @@ class Classifier {
       mesh_.patches[patch].normal = normalized(normal);
     }
     for (const auto& face : faces_) {
+      if (kinds_[static_cast<std::size_t>(face.kind)].frozen) continue;  // its shape does not matter: nothing moves
       auto& patch =
           mesh_.patches[static_cast<std::size_t>(mesh_.element(element_of(face.ref)).patch[local_face(face.ref)])];
       const LocalId from = origin[static_cast<std::size_t>(&patch - mesh_.patches.data())];

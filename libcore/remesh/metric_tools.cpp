@@ -171,9 +171,25 @@ void bound(Metric& metric, Real smallest, Real largest) {
   }
 }
 
+/// ln det M at each node.
 template <int D>
-Real metric_volume(const RemeshMesh& mesh, const Metric& metric) {
-  Real sum = 0;
+std::vector<Real> log_determinants(const RemeshMesh& mesh, const Metric& metric) {
+  std::vector<Real> logs(static_cast<std::size_t>(mesh.nodes()), 0);
+  for (std::size_t node = 0; node < logs.size(); ++node) {
+    if (metric.kind() != Metric::Kind::tensors) {
+      logs[node] = -2 * D * std::log(metric.values()[metric.kind() == Metric::Kind::uniform ? 0 : node]);
+      continue;
+    }
+    for (const Real value : eigen_system<D>(tensor_at<D>(metric, node)).values) logs[node] += std::log(value);
+  }
+  return logs;
+}
+
+/// Volumes of the elements in metric space.
+template <int D>
+std::vector<Real> metric_volumes(const RemeshMesh& mesh, const Metric& metric) {
+  const std::vector<Real> logs = log_determinants<D>(mesh, metric);
+  std::vector<Real> volumes(static_cast<std::size_t>(mesh.elements()));
   for (LocalId e = 0; e < mesh.elements(); ++e) {
     std::array<Point<D>, D + 1> x;
     PointPointers<D> pointers;
@@ -182,12 +198,12 @@ Real metric_volume(const RemeshMesh& mesh, const Metric& metric) {
     for (std::size_t k = 0; k <= D; ++k) {
       x[k] = point_at<D>(mesh, nodes[k]);
       pointers[k] = &x[k];
-      for (const Real value : eigen_system<D>(tensor_at<D>(metric, static_cast<std::size_t>(nodes[k]))).values)
-        log_determinant += std::log(value) / (D + 1);
+      log_determinant += logs[static_cast<std::size_t>(nodes[k])] / (D + 1);
     }
-    sum += std::abs(scaled_volume<D>(pointers)) / factorial<D> * std::exp(0.5 * log_determinant);
+    volumes[static_cast<std::size_t>(e)] =
+        std::abs(scaled_volume<D>(pointers)) / factorial<D> * std::exp(0.5 * log_determinant);
   }
-  return sum;
+  return volumes;
 }
 
 }  // namespace
@@ -230,18 +246,42 @@ Metric intersect(const RemeshMesh& mesh, const Metric& a, const Metric& b) {
   return Metric::tensors(mesh.dimension, std::move(tensors));
 }
 
-Real predicted_elements(const RemeshMesh& mesh, const Metric& metric) {
+void intersect_at(Metric& metric, LocalId node, std::span<const Real> other) {
+  const auto n = static_cast<std::size_t>(node);
+  if (metric.kind() == Metric::Kind::sizes) {
+    metric.values()[n] = std::min(metric.values()[n], other[0]);
+    return;
+  }
+  const auto cut = [&]<int D>(std::integral_constant<int, D>) {
+    Symmetric<D> b;
+    std::copy_n(other.begin(), b.size(), b.begin());
+    const Symmetric<D> a = tensor_at<D>(metric, n);
+    if (a != b) store<D>(metric, n, intersection<D>(a, b));
+  };
+  metric.components() == 3 ? cut(std::integral_constant<int, 2>{}) : cut(std::integral_constant<int, 3>{});
+}
+
+std::vector<Real> predicted_elements_of_each(const RemeshMesh& mesh, const Metric& metric) {
   const Real unit = mesh.dimension == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
-  return (mesh.dimension == 2 ? metric_volume<2>(mesh, metric) : metric_volume<3>(mesh, metric)) / unit;
+  std::vector<Real> counts = mesh.dimension == 2 ? metric_volumes<2>(mesh, metric) : metric_volumes<3>(mesh, metric);
+  for (Real& count : counts) count /= unit;
+  return counts;
+}
+
+Real predicted_elements(const RemeshMesh& mesh, const Metric& metric) {
+  const std::vector<Real> counts = predicted_elements_of_each(mesh, metric);
+  return std::accumulate(counts.begin(), counts.end(), 0.0);
+}
+
+void scale_sizes(Metric& metric, Real factor) {
+  const bool tensors = metric.kind() == Metric::Kind::tensors;
+  for (Real& value : metric.values()) value *= tensors ? 1 / (factor * factor) : factor;
 }
 
 void scale_to_nodes(const RemeshMesh& mesh, Metric& metric, Real nodes) {
-  const Real elements_per_node = mesh.dimension == 2 ? 1.9 : 4.6;
-  const Real now = predicted_elements(mesh, metric) / elements_per_node;
+  const Real now = predicted_elements(mesh, metric) / predicted_per_node(mesh.dimension);
   if (!(now > 0) || !(nodes > 0)) return;
-  const Real factor = std::pow(now / nodes, 1.0 / mesh.dimension);  // on sizes
-  const bool tensors = metric.kind() == Metric::Kind::tensors;
-  for (Real& value : metric.values()) value *= tensors ? 1 / (factor * factor) : factor;
+  scale_sizes(metric, std::pow(now / nodes, 1.0 / mesh.dimension));
 }
 
 Metric current_sizes(const RemeshMesh& mesh) {

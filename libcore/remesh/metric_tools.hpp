@@ -2,6 +2,8 @@
 
 /// Making metrics fit for use: bounds, gradation, intersection, a wanted number of nodes.
 
+#include <span>
+
 #include "remesh/metric.hpp"
 
 namespace malleus {
@@ -22,10 +24,22 @@ Metric intersect(const RemeshMesh& mesh, const Metric& a, const Metric& b);
 /// Number of elements that a remesh with this metric should make: the sum over elements of V sqrt(det M) over the
 /// volume of the regular unit simplex.
 Real predicted_elements(const RemeshMesh& mesh, const Metric& metric);
+/// The same for each element: how many should take its place. [element]
+std::vector<Real> predicted_elements_of_each(const RemeshMesh& mesh, const Metric& metric);
 
-/// Scales all sizes by one factor such that a remesh should make about this many nodes: elements over nodes taken as 2
-/// in 2D and 4.6 in 3D, as measured on our own meshes (whose elements are a fifth smaller than regular unit ones).
+/// Predicted elements over nodes, as measured on our own meshes (whose elements are a fifth smaller than regular ones).
+constexpr Real predicted_per_node(int dimension) {
+  return dimension == 2 ? 1.9 : 4.6;
+}
+
+/// Multiplies all sizes, in every direction, by a factor > 0.
+void scale_sizes(Metric& metric, Real factor);
+
+/// Scales all sizes by one factor such that a remesh should make about this many nodes.
 void scale_to_nodes(const RemeshMesh& mesh, Metric& metric, Real nodes);
+
+/// The metric of one node becomes the intersection with another's. Both of the same kind, not uniform.
+void intersect_at(Metric& metric, LocalId node, std::span<const Real> other);
 
 /// The mesh's own sizes: at a node, the mean length of its edges [m].
 Metric current_sizes(const RemeshMesh& mesh);

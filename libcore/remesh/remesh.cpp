@@ -28,6 +28,21 @@ void set_metrics(const Metric& metric, WorkingMesh<D, VertexMetric>& mesh) {
   }
 }
 
+template <int D, class VertexMetric>
+Metric metric_of(const WorkingMesh<D, VertexMetric>& mesh, const Metric& input) {
+  if (input.kind() == Metric::Kind::uniform) return input;
+  std::vector<Real> values;
+  for (const auto& metric : mesh.metrics) {
+    if constexpr (VertexMetric::is_tensor) {
+      values.insert(values.end(), metric.metric.begin(), metric.metric.end());
+    } else {
+      values.push_back(1 / metric.inverse_size);
+    }
+  }
+  if constexpr (VertexMetric::is_tensor) return Metric::tensors(D, std::move(values));
+  return Metric::per_node(std::move(values));
+}
+
 /// Takes all patches with their vertices out of what may change.
 template <int D, class VertexMetric>
 void fix_surface(WorkingMesh<D, VertexMetric>& mesh) {
@@ -41,7 +56,7 @@ void set_keys(WorkingMesh<D, VertexMetric>& mesh) {
 }
 
 template <int D, class VertexMetric>
-RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOptions& options) {
+RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOptions& options, Metric* carried) {
   const auto start = std::clock();
   RemeshReport report;
   WorkingMesh<D, VertexMetric> mesh;
@@ -67,6 +82,7 @@ RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOp
   if (options.keep_volume) report.volume_error = restore_volumes(mesh, volumes);
   report.after = assess(mesh);
   input = to_arrays(mesh);
+  if (carried != nullptr) *carried = metric_of(mesh, metric);
   report.nodes_after = input.nodes();
   report.elements_after = input.elements();
   report.volume_after = signed_volume(input);
@@ -76,15 +92,15 @@ RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOp
 
 }  // namespace
 
-RemeshReport remesh(RemeshMesh& mesh, const Metric& metric, const RemeshOptions& options) {
+RemeshReport remesh(RemeshMesh& mesh, const Metric& metric, const RemeshOptions& options, Metric* carried) {
   check_arrays(mesh);
   check_metric(mesh, metric);
   const bool tensors = metric.kind() == Metric::Kind::tensors;
   if (mesh.dimension == 2)
-    return tensors ? remesh_with<2, TensorMetric<2>>(mesh, metric, options)
-                   : remesh_with<2, SizeMetric<2>>(mesh, metric, options);
-  return tensors ? remesh_with<3, TensorMetric<3>>(mesh, metric, options)
-                 : remesh_with<3, SizeMetric<3>>(mesh, metric, options);
+    return tensors ? remesh_with<2, TensorMetric<2>>(mesh, metric, options, carried)
+                   : remesh_with<2, SizeMetric<2>>(mesh, metric, options, carried);
+  return tensors ? remesh_with<3, TensorMetric<3>>(mesh, metric, options, carried)
+                 : remesh_with<3, SizeMetric<3>>(mesh, metric, options, carried);
 }
 
 }  // namespace malleus

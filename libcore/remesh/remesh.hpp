@@ -46,6 +46,8 @@ struct RemeshReport {
 /// Remeshes in place. Nodes and elements come out in Morton order, facets and curves complete. Throws InputError for
 /// input that is no simplicial mesh (bad numbers, faces of more than two elements) or a metric that does not fit.
 /// Elements that no operation could turn are counted in the report's after.inverted. Local; deterministic.
-RemeshReport remesh(RemeshMesh& mesh, const Metric& metric, const RemeshOptions& options = {});
+/// carried: if given, receives the metric at the nodes of the new mesh, of the same kind.
+RemeshReport remesh(RemeshMesh& mesh, const Metric& metric, const RemeshOptions& options = {},
+                    Metric* carried = nullptr);
 
 }  // namespace malleus

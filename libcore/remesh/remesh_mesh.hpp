@@ -25,6 +25,7 @@ struct RemeshMesh {
   std::vector<std::int32_t> curve_group;     ///< [curve edge], -1 = unnamed
   std::vector<LocalId> corners;              ///< nodes that must stay where they are, and stay nodes
   std::vector<std::uint8_t> frozen;          ///< [node] 1 = on a parallel interface; empty = none frozen
+  std::vector<LocalId> origin;               ///< [node] after a remesh: the node's number before, -1 = a new node
 
   LocalId nodes() const { return static_cast<LocalId>(coordinates.size() / static_cast<std::size_t>(dimension)); }
   LocalId elements() const { return static_cast<LocalId>(element_region.size()); }

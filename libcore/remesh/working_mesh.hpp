@@ -67,6 +67,7 @@ struct Vertex {
   bool frozen = false;  ///< on a parallel interface
   bool fixed = false;   ///< may not move or vanish: frozen, or on a surface that is to be kept
   bool waits = false;   ///< on the list of vertices to relocate
+  LocalId origin = -1;  ///< number of the node in the input, -1: made since
 };
 
 /// A connected piece of boundary or of an interface, bounded by feature edges.

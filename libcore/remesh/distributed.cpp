@@ -1,0 +1,246 @@
+#include "remesh/distributed.hpp"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "partition/balance.hpp"
+#include "remesh/interface_strip.hpp"
+#include "remesh/selection.hpp"
+
+namespace malleus {
+namespace {
+
+constexpr const char* mark_field_name = "remeshing_mark";
+
+std::size_t index(LocalId entity) {
+  return static_cast<std::size_t>(entity);
+}
+
+class DistributedRemesher {
+ public:
+  DistributedRemesher(const Communicator& comm, Mesh& mesh, FieldStore& fields, const Metric& metric,
+                      const DistributedRemeshOptions& options)
+      : comm_(comm), mesh_(mesh), fields_(fields), uniform_(metric), options_(options) {
+    store_metric(mesh, metric, fields);
+  }
+
+  DistributedRemeshReport run() {
+    report_.nodes_before = mesh_.total_nodes();
+    report_.elements_before = mesh_.total_elements;
+    timed("report", [&] { report_.before = metric_fit(comm_, mesh_, metric()); });
+    while (refine_in_stage()) {
+    }
+    timed("balance", [&] { spread(metric(), comm_.size()); });
+    remesh_all(options_.local);
+    remesh_strips();
+    timed("balance", [&] { balance_along_curve(comm_, mesh_, fields_); });
+    timed("report", [&] { report_.after = metric_fit(comm_, mesh_, metric()); });
+    if (fields_.has(metric_field_name)) fields_.remove(metric_field_name);
+    finish();
+    return report_;
+  }
+
+ private:
+  Metric metric() const { return stored_metric(mesh_, fields_, uniform_); }
+
+  template <class Work>
+  void timed(const char* name, Work work) {
+    if (options_.announces) options_.announces(name);
+    const Real start = MPI_Wtime();
+    work();
+    const Real seconds = MPI_Wtime() - start;
+    for (RemeshPhase& phase : report_.phases) {
+      if (phase.name == name) {
+        phase.seconds += seconds;
+        return;
+      }
+    }
+    report_.phases.push_back({name, seconds});
+  }
+
+  /// Divides the mesh among the first ranks by what each element will become.
+  void spread(const Metric& wanted, int ranks) {
+    if (comm_.size() == 1) return;
+    // What an element costs even if it is only looked at or taken away, in elements to be made.
+    constexpr Real own_cost = 0.3;
+    constexpr Real scale = 1000;
+    const std::vector<Real> predicted = predicted_elements_of_each(local_arrays(mesh_), wanted);
+    std::vector<GlobalId> weights;
+    for (const Real count : predicted)
+      weights.push_back(static_cast<GlobalId>(std::clamp(scale * (count + own_cost), 1.0, 1e12)));
+    const MigrationReport moved = divide_along_curve(comm_, mesh_, fields_, weights, ranks);
+    moved_ += moved.moved_elements;
+    sent_ += moved.sent_bytes;
+  }
+
+  /// A mesh too small for all ranks grows at most eightfold on those that have enough to do.
+  bool refine_in_stage() {
+    constexpr Real growth = 8;
+    const GlobalId ranks = std::clamp<GlobalId>(mesh_.total_elements / options_.fewest_elements, 1, comm_.size());
+    const Metric wanted = metric();
+    const Real predicted = predicted_elements(comm_, mesh_, wanted);
+    if (ranks == comm_.size() || predicted <= growth * static_cast<Real>(mesh_.total_elements)) return false;
+    const Real factor = std::pow(predicted / (growth * static_cast<Real>(mesh_.total_elements)), 1.0 / mesh_.dim);
+    timed("balance", [&] { spread(wanted, static_cast<int>(ranks)); });
+    remesh_coarser(factor);
+    return true;
+  }
+
+  /// Remeshes with sizes that are larger than wanted by up to a factor, but no larger than now.
+  void remesh_coarser(Real factor) {
+    const Metric wanted = metric();
+    const bool was_uniform = wanted.kind() == Metric::Kind::uniform;
+    const Metric now = current_sizes(comm_, mesh_);
+    const Real uniform = uniform_.values().front();
+    Metric coarser = was_uniform ? Metric::per_node(std::vector<Real>(index(mesh_.nodes()), uniform)) : wanted;
+    const auto n = static_cast<std::size_t>(coarser.components());
+    for (std::size_t node = 0; node < index(mesh_.nodes()); ++node) {
+      const bool tensors = coarser.kind() == Metric::Kind::tensors;
+      const Real size = tensors ? largest_size(coarser, node) : coarser.values()[node];
+      const Real times = std::clamp(now.values()[node] / size, 1.0, factor);
+      for (std::size_t c = 0; c < n; ++c) coarser.values()[node * n + c] *= tensors ? 1 / (times * times) : times;
+    }
+    // The wanted metric travels along as an ordinary field, its values interpolated linearly.
+    keep_wanted(wanted);
+    store_metric(mesh_, coarser, fields_);
+    RemeshOptions quick = options_.local;
+    quick.improvement_rounds = std::min(quick.improvement_rounds, 2);
+    quick.keep_volume = false;
+    remesh_all(quick);
+    restore_wanted(was_uniform);
+  }
+
+  Real largest_size(const Metric& tensors, std::size_t node) const {
+    const auto n = static_cast<std::size_t>(tensors.components());
+    Real trace = 0;
+    for (int i = 0; i < mesh_.dim; ++i) trace += tensors.values()[node * n + static_cast<std::size_t>(i * (i + 3) / 2)];
+    return std::sqrt(mesh_.dim / trace);
+  }
+
+  void keep_wanted(const Metric& wanted) {
+    if (wanted.kind() == Metric::Kind::uniform) return;
+    Field& kept = fields_.declare(mesh_, {wanted_field_name, "1", Support::node, wanted.components()});
+    kept.assign(wanted.values());
+  }
+  void restore_wanted(bool was_uniform) {
+    if (was_uniform) {
+      fields_.remove(metric_field_name);
+      return;
+    }
+    const Field& kept = fields_[wanted_field_name];
+    std::vector<Real> values(kept.values().begin(), kept.values().end());
+    const Metric wanted =
+        kept.components() == 1 ? Metric::per_node(std::move(values)) : Metric::tensors(mesh_.dim, std::move(values));
+    fields_.remove(wanted_field_name);
+    store_metric(mesh_, wanted, fields_);
+  }
+
+  void remesh_all(const RemeshOptions& options) {
+    timed("remesh", [&] { remesh(std::vector<std::uint8_t>(index(mesh_.elements()), 1), options); });
+  }
+
+  void remesh(const std::vector<std::uint8_t>& selected, const RemeshOptions& options) {
+    const auto start = std::clock();
+    const auto mine = static_cast<GlobalId>(std::count(selected.begin(), selected.end(), 1));
+    const RemeshReport local = remesh_selection(comm_, mesh_, fields_, selected, uniform_, options);
+    RemeshRound round;
+    round.elements = comm_.sum(mine);
+    round.largest_elements = comm_.max(mine);
+    round.moved_elements = moved_;
+    round.sent_bytes = sent_;
+    round.remesh_s = comm_.max(static_cast<Real>(std::clock() - start) / CLOCKS_PER_SEC);
+    report_.rounds.push_back(round);
+    moved_ = 0;
+    sent_ = 0;
+    report_.splits += local.splits;
+    report_.collapses += local.collapses;
+    report_.swaps += local.swaps;
+    report_.moves += local.moves;
+    report_.volume_error = std::max(report_.volume_error, local.volume_error);
+  }
+
+  void remesh_strips() {
+    // Marks follow the mesh as a field: on nodes that interfaces held in the last remesh.
+    fields_.declare(mesh_, {mark_field_name, "1", Support::node, 1});
+    std::vector<std::uint8_t> marks = shared_nodes(mesh_);
+    for (int round = 0; round < options_.strip_rounds && comm_.any(is_any(marks)); ++round) {
+      timed("move interfaces", [&] {
+        set_marks(marks);
+        const MigrationReport moved =
+            migrate(comm_, mesh_, fields_, move_interfaces(comm_, mesh_, marks, options_.moved_layers, round));
+        moved_ += moved.moved_elements;
+        sent_ += moved.sent_bytes;
+      });
+      timed("remesh strips", [&] { marks = remesh_strip(); });
+    }
+    fields_.remove(mark_field_name);
+    report_.interface_nodes = comm_.sum(static_cast<GlobalId>(std::count(marks.begin(), marks.end(), 1)));
+  }
+
+  /// Remeshes about the marked nodes; returns those that were held by an interface again, in the new mesh.
+  std::vector<std::uint8_t> remesh_strip() {
+    const std::vector<int> distance = layers_from(comm_, mesh_, get_marks(), options_.strip_layers);
+    std::vector<std::uint8_t> selected(index(mesh_.elements()), 0);
+    for (LocalId e = 0; e < mesh_.elements(); ++e) {
+      int nearest = options_.strip_layers;
+      for (const LocalId node : mesh_.nodes_of_element(e)) nearest = std::min(nearest, distance[index(node)]);
+      selected[index(e)] = nearest < options_.strip_layers ? 1 : 0;
+    }
+    const std::vector<std::uint8_t> shared = shared_nodes(mesh_);
+    std::vector<std::uint8_t> held(shared.size(), 0);
+    for (std::size_t node = 0; node < held.size(); ++node)
+      held[node] = shared[node] != 0 && distance[node] <= 1 ? 1 : 0;
+    set_marks(held);
+    remesh(selected, options_.local);
+    // Marks of new nodes are interpolated: what was held keeps exactly 1 and its place among the shared nodes.
+    std::vector<std::uint8_t> marks = get_marks();
+    const std::vector<std::uint8_t> shared_now = shared_nodes(mesh_);
+    for (std::size_t node = 0; node < marks.size(); ++node)
+      marks[node] = marks[node] != 0 && shared_now[node] != 0 ? 1 : 0;
+    return marks;
+  }
+
+  static bool is_any(const std::vector<std::uint8_t>& marks) {
+    return std::find(marks.begin(), marks.end(), 1) != marks.end();
+  }
+  void set_marks(const std::vector<std::uint8_t>& marks) {
+    fields_[mark_field_name].assign({marks.begin(), marks.end()});
+  }
+  std::vector<std::uint8_t> get_marks() const {
+    std::vector<std::uint8_t> marks;
+    for (const Real value : fields_[mark_field_name].values()) marks.push_back(value >= 1 ? 1 : 0);
+    return marks;
+  }
+
+  void finish() {
+    report_.nodes_after = mesh_.total_nodes();
+    report_.elements_after = mesh_.total_elements;
+    for (GlobalId* count : {&report_.splits, &report_.collapses, &report_.swaps, &report_.moves})
+      *count = comm_.sum(*count);
+    report_.volume_error = comm_.max(report_.volume_error);
+    for (RemeshPhase& phase : report_.phases) phase.seconds = comm_.max(phase.seconds);
+  }
+
+  static constexpr const char* wanted_field_name = "remeshing_wanted";
+
+  const Communicator& comm_;
+  Mesh& mesh_;
+  FieldStore& fields_;
+  Metric uniform_;  ///< the metric where it is uniform; else the store has it
+  const DistributedRemeshOptions& options_;
+  DistributedRemeshReport report_;
+  GlobalId moved_ = 0;  ///< since the last round
+  GlobalId sent_ = 0;
+};
+
+}  // namespace
+
+DistributedRemeshReport remesh_distributed(const Communicator& comm, Mesh& mesh, FieldStore& fields,
+                                           const Metric& metric, const DistributedRemeshOptions& options) {
+  return DistributedRemesher(comm, mesh, fields, metric, options).run();
+}
+
+}  // namespace malleus
