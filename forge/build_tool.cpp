@@ -21,7 +21,12 @@ std::unique_ptr<ToolShape> build_surface(const ToolSettings& settings, int dim, 
   FacetSet set = read_surface_file(settings.file.string(), dim, settings.surface_scale());
   for (Vector& point : set.points) point += vector_of(settings.point);
   SurfaceReport report;
-  std::unique_ptr<ToolShape> shape = make_surface(std::move(set), settings.side, report);
+  std::unique_ptr<ToolShape> shape;
+  try {
+    shape = make_surface(std::move(set), settings.side, report);
+  } catch (const InputError& error) {
+    throw InputError("[tool." + settings.name + "] file = " + settings.file.string() + ": " + error.what());
+  }
   if (!report.closed) warning = "tool " + settings.name + ": its surface is not closed; sides are told near it only";
   if (report.turned) warning = "tool " + settings.name + ": the normals of its surface pointed inward and were turned";
   return shape;

@@ -7,12 +7,15 @@
 #include <sstream>
 
 #include "base/error.hpp"
+#include "mesh/msh_reader.hpp"
 
 namespace malleus::forge {
 namespace {
 
 constexpr std::size_t stl_header = 84;
 constexpr std::size_t stl_facet = 50;
+/// Points nearer than this share of the surface's extent are one.
+constexpr Real same_place = 1e-9;
 
 std::string read_all(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -127,11 +130,79 @@ FacetSet parse_stl(const std::string& content, const std::string& name, Real len
     point *= length_unit;
     box.add(point);
   }
-  return merge_points(loose, 1e-9 * (box.high - box.low).norm());
+  return merge_points(loose, same_place * (box.high - box.low).norm());
 }
 
+void turn_alike(FacetSet& set) {
+  using Ridge = std::array<LocalId, 2>;
+  const auto dim = static_cast<std::size_t>(set.dim);
+  // Each facet passes a ridge one way: an edge in 3D from corner k to the next, a point in 2D as its start or its end.
+  const auto ridge = [&](std::size_t f, std::size_t k) {
+    const auto& corners = set.facets[f];
+    const LocalId a = corners[k];
+    const LocalId b = dim == 2 ? a : corners[(k + 1) % 3];
+    const bool forth = dim == 2 ? k == 0 : a < b;
+    return std::pair(Ridge{std::min(a, b), std::max(a, b)}, forth);
+  };
+  std::map<Ridge, std::vector<std::pair<std::size_t, bool>>> at_ridge;
+  for (std::size_t f = 0; f < set.facets.size(); ++f) {
+    for (std::size_t k = 0; k < dim; ++k) at_ridge[ridge(f, k).first].emplace_back(f, ridge(f, k).second);
+  }
+  constexpr int unknown = -1;
+  std::vector<int> turned(set.facets.size(), unknown);
+  for (std::size_t seed = 0; seed < set.facets.size(); ++seed) {
+    if (turned[seed] != unknown) continue;
+    turned[seed] = 0;
+    std::vector<std::size_t> front = {seed};
+    while (!front.empty()) {
+      const std::size_t f = front.back();
+      front.pop_back();
+      for (std::size_t k = 0; k < dim; ++k) {
+        const auto [key, forth] = ridge(f, k);
+        for (const auto& [other, other_forth] : at_ridge[key]) {
+          if (turned[other] != unknown) continue;
+          turned[other] = (forth == other_forth) != (turned[f] == 1) ? 1 : 0;
+          front.push_back(other);
+        }
+      }
+    }
+  }
+  for (std::size_t f = 0; f < set.facets.size(); ++f) {
+    if (turned[f] == 1) std::swap(set.facets[f][0], set.facets[f][1]);
+  }
+}
+
+namespace {
+
+FacetSet from_gmsh(const std::string& path, int dim, Real length_unit) {
+  const MshSurface surface = read_msh_surface(path, dim);
+  FacetSet loose;
+  loose.dim = dim;
+  loose.facets = surface.facets;
+  if (loose.facets.empty()) {
+    throw InputError(path + (dim == 3 ? ": the file has no triangles, of which a tool's surface is made in 3D"
+                                      : ": the file has no lines, of which a tool's surface is made in 2D"));
+  }
+  std::vector<char> is_used(surface.points.size(), 0);
+  for (const auto& facet : loose.facets) {
+    for (int k = 0; k < dim; ++k) is_used[static_cast<std::size_t>(facet[static_cast<std::size_t>(k)])] = 1;
+  }
+  Bounds box;
+  for (std::size_t i = 0; i < surface.points.size(); ++i) {
+    loose.points.push_back(length_unit * to_vector(surface.points[i].data(), 3));
+    if (dim == 2) loose.points.back()[2] = 0;
+    if (is_used[i] != 0) box.add(loose.points.back());
+  }
+  FacetSet set = merge_points(loose, same_place * (box.high - box.low).norm());
+  turn_alike(set);
+  return set;
+}
+
+}  // namespace
+
 FacetSet read_surface_file(const std::string& path, int dim, Real length_unit) {
-  if (dim != 3) throw InputError(path + ": STL surfaces are for 3D cases; give the lines of a gmsh mesh in 2D");
+  if (path.ends_with(".msh")) return from_gmsh(path, dim, length_unit);
+  if (dim != 3) throw InputError(path + ": STL surfaces are for 3D cases; give the lines of a gmsh mesh (.msh) in 2D");
   return parse_stl(read_all(path), path, length_unit);
 }
 

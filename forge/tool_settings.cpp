@@ -23,8 +23,10 @@ void ToolSettings::describe_shape(Section& s) {
             {"box", ShapeKind::box},
             {"surface", ShapeKind::surface}},
            "of the rigid tool");
-  s.choice("material", side, {{"outside", Side::outside}, {"inside", Side::inside}},
-           "where the material is: around a punch, within a container (not for planes)");
+  s.choice(
+      "material", side, {{"outside", Side::outside}, {"inside", Side::inside}},
+      "where the material is: around a punch, within a container (not for planes); of an open surface, outside is the "
+      "side of its normals (in 2D on the right of the lines' direction)");
   s.vector("point", point, "m", "a point of the plane; the centre of a sphere, a box, a cylinder; shift of a surface")
       .starter("0 0 10 mm");
   s.vector("normal", normal, "", "of a plane, out of the tool toward the material").starter("0 0 -1");
@@ -32,7 +34,9 @@ void ToolSettings::describe_shape(Section& s) {
   s.real("radius", radius, "m", "of a sphere or cylinder").above(0);
   s.real("length", length, "m", "of a cylinder with flat ends, centred at `point`").above(0).default_is("infinite");
   s.vector("size", size, "m", "edge lengths of a box; 0 = unlimited").at_least(0);
-  s.path("file", file, "surface: STL, ASCII or binary (3D)").existing_file();
+  s.path("file", file,
+         "surface: STL, ASCII or binary (3D), or a gmsh mesh (.msh), of which the triangles count, in 2D the lines")
+      .existing_file();
   s.string("length_unit", length_unit, "unit of the coordinates in the surface file");
 }
 

@@ -6,12 +6,14 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <set>
 
 #include "base/error.hpp"
 #include "mesh/file_reader.hpp"
 #include "mesh/msh_layout.hpp"
+#include "mesh/msh_scanner.hpp"
 #include "parallel/agreement.hpp"
 
 namespace malleus {
@@ -366,7 +368,44 @@ void set_points(const RawMesh& raw, Real length_unit, MeshChunk& chunk) {
   }
 }
 
+RawMesh read_whole(const std::string& path) {
+  RawMesh mesh;
+  const MshLayout layout = scan_msh(path);
+  ShareReader reader(path, layout);
+  for (const MshNodeStretch& stretch : layout.nodes) reader.read_nodes(stretch, {0, stretch.count}, mesh);
+  for (const MshElementStretch& stretch : layout.elements) reader.read_elements(stretch, {0, stretch.count}, mesh);
+  return mesh;
+}
+
 }  // namespace
+
+MshSurface read_msh_surface(const std::string& path, int facet_nodes) {
+  check(facet_nodes == 2 || facet_nodes == 3, "facets are lines or triangles");
+  const RawMesh raw = read_whole(path);
+  MshSurface surface;
+  std::map<GlobalId, LocalId> place;
+  for (std::size_t i = 0; i < raw.node_numbers.size(); ++i) {
+    if (!place.emplace(raw.node_numbers[i], static_cast<LocalId>(i)).second) {
+      throw InputError(fmt::format("{}: node {} stands twice in the file", path, raw.node_numbers[i]));
+    }
+    surface.points.push_back({raw.points[3 * i], raw.points[3 * i + 1], raw.points[3 * i + 2]});
+  }
+  const std::vector<GlobalId>& nodes = raw.elements[static_cast<std::size_t>(facet_nodes - 1)].nodes;
+  const auto count = static_cast<std::size_t>(facet_nodes);
+  for (std::size_t first = 0; first < nodes.size(); first += count) {
+    std::array<LocalId, 3> facet = {-1, -1, -1};
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto found = place.find(nodes[first + k]);
+      if (found == place.end()) {
+        throw InputError(
+            fmt::format("{}: an element names node {}, which the file does not have", path, nodes[first + k]));
+      }
+      facet[k] = found->second;
+    }
+    surface.facets.push_back(facet);
+  }
+  return surface;
+}
 
 MeshChunk read_msh(const Communicator& comm, const std::string& path, Real length_unit) {
   check(length_unit > 0, "the unit of length is positive");

@@ -266,6 +266,59 @@ class Contact(Forging):
         self.assertGreater(rows[1]["force_upper_y_N"], 0.9 * flow_stress(2, 1, 0.3))
 
 
+class SurfaceTools(Forging):
+    """A tool from a gmsh file does what the plane does that it draws."""
+
+    @staticmethod
+    def write_msh(path, dim, points, facets):
+        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(points))]
+        lines += [f"{i} " + " ".join(repr(float(c)) for c in p) for i, p in enumerate(points, 1)]
+        lines += ["$EndNodes", "$Elements", str(len(facets))]
+        lines += [f"{i} {dim - 1} 2 1 1 " + " ".join(str(n + 1) for n in f) for i, f in enumerate(facets, 1)]
+        path.write_text("\n".join(lines + ["$EndElements", ""]))
+
+    def check(self, dim, points, facets, ranks=1, keys=""):
+        axis = dim - 1
+        box_mesh(self.directory / "box.msh", dim)
+        self.write_msh(self.directory / "tool.msh", dim, points, facets)
+        text = case_text(0.3, dim, axis, "tools", time="increments = 2\nstep = 0.02")
+        expected = self.forge(text, ranks=ranks)
+        plane = f"shape = plane\npoint = {vector(dim, axis, 1.0)}\nnormal = {vector(dim, axis, -1.0)}\n"
+        self.assertIn(plane, text)
+        surface = f"shape = surface\nfile = tool.msh\nlength_unit = mm\n{keys}"
+        rows = self.forge(text.replace(plane, surface), ranks=ranks, name="surface")
+        for row, other in zip(rows, expected):
+            column = f"force_upper_{'xyz'[axis]}_N"
+            self.assertAlmostEqual(row[column] / other[column], 1, delta=1e-6)
+
+    def test_triangles_are_a_tool(self):
+        # A block above the billet, its faces turned at random; closed, so that they are turned outward.
+        mm = 1000.0
+        points = [(x, y, z) for z in (mm, 1.5 * mm) for y in (-mm, 3 * mm) for x in (-mm, 3 * mm)]
+        quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+        facets = [t for i, (a, b, c, d) in enumerate(quads)
+                  for t in ([(a, b, c), (c, a, d)] if i % 2 else [(a, c, b), (a, c, d)])]
+        for ranks in (1, 3):
+            self.check(3, points, facets, ranks=ranks)
+
+    def test_lines_are_a_tool_in_two_dimensions(self):
+        # From left to right the right-hand side, the material's, is below.
+        mm = 1000.0
+        points = [(x * mm, mm, 0) for x in (-1, 0.4, 1.3, 3)]
+        self.check(2, points, [(0, 1), (1, 2), (3, 2)])
+        self.check(2, points, [(3, 2), (2, 1), (0, 1)], keys="material = inside\n", ranks=2)
+
+    def test_files_without_a_surface_are_refused(self):
+        box_mesh(self.directory / "box.msh", 2)
+        self.write_msh(self.directory / "tool.msh", 2, [(0, 0, 0)], [])
+        text = case_text(0.3, 2, 1, "tools") + "[tool.other]\nshape = surface\nfile = tool.msh\n"
+        (self.directory / "case.ini").write_text(text)
+        for ranks in (1, 2):
+            result = run("forge", self.directory / "case.ini", self.directory / "out", ranks=ranks, check=False)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("tool.msh: the file has no lines", result.stderr)
+
+
 class Presses(Forging):
     """Frictionless upsetting in plane strain, height 1, volume 1: F = (1/H) 2 K (2 w/H)^m."""
 

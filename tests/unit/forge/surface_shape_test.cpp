@@ -215,5 +215,25 @@ TEST(Stl, DamagedFilesAreRefusedWithTheirPlace) {
   EXPECT_NE(message(binary_stl(box_surface({0, 0, 0}, {1, 1, 1})).substr(0, 300)).find("die.stl"), std::string::npos);
 }
 
+TEST(SurfaceFile, FacetsAreTurnedAlike) {
+  FacetSet set = box_surface({0, 0, 0}, {1, 2, 3});
+  for (const std::size_t f : {1, 4, 7, 8}) std::swap(set.facets[f][0], set.facets[f][2]);
+  turn_alike(set);
+  SurfaceReport report;
+  const auto shape = make_surface(set, Side::outside, report);
+  EXPECT_TRUE(report.closed);
+  EXPECT_FALSE(report.turned);
+  EXPECT_NEAR(shape->nearest({0.5, 1, 3.5}).distance, 0.5, 1e-14);
+  EXPECT_NEAR(shape->nearest({0.5, 1, 2.75}).distance, -0.25, 1e-14);
+
+  FacetSet line;
+  line.dim = 2;
+  line.points = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
+  line.facets = {{0, 1, -1}, {2, 1, -1}, {2, 3, -1}};
+  turn_alike(line);
+  EXPECT_EQ(line.facets[1][0], 1);
+  EXPECT_EQ(line.facets[2][0], 2);
+}
+
 }  // namespace
 }  // namespace malleus::forge

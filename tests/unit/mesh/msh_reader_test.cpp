@@ -125,6 +125,36 @@ TEST_P(MshFile, IdsArePlacesInTheFile) {
   EXPECT_EQ(world().sum(sum), mesh.total_elements * (mesh.total_elements - 1) / 2);
 }
 
+TEST_P(MshFile, SurfacesAreReadByThemselves) {
+  const ScratchDirectory scratch;
+  const MshMesh mesh = box_msh(dim(), cells);
+  const std::string path = put_file(scratch, "box.msh", msh_bytes(mesh, flavour()));
+  const MshSurface surface = read_msh_surface(path, dim());
+  using Corners = std::vector<std::array<Real, 3>>;
+  std::vector<Corners> expected;
+  for (const test::MshElement& element : mesh.elements) {
+    if (static_cast<int>(element.nodes.size()) != dim()) continue;
+    Corners& corners = expected.emplace_back();
+    for (const GlobalId tag : element.nodes) {
+      corners.push_back(std::find_if(mesh.nodes.begin(), mesh.nodes.end(), [&](const test::MshNode& node) {
+                          return node.tag == tag;
+                        })->point);
+    }
+  }
+  std::vector<Corners> found;
+  for (const auto& facet : surface.facets) {
+    Corners& corners = found.emplace_back();
+    for (int k = 0; k < dim(); ++k) {
+      const LocalId node = facet[static_cast<std::size_t>(k)];
+      corners.push_back(surface.points[static_cast<std::size_t>(node)]);
+    }
+  }
+  std::sort(expected.begin(), expected.end());  // MSH 4 keeps them by entity
+  std::sort(found.begin(), found.end());
+  EXPECT_GT(found.size(), 0U);
+  EXPECT_EQ(found, expected);
+}
+
 TEST_P(MshFile, WithoutPhysicalGroupsIsOneRegion) {
   MshMesh file = box_msh(dim(), 2);
   file.names.clear();
