@@ -62,6 +62,7 @@ void Flow::rebuild() {
 }
 
 void Flow::start() {
+  fronts_.set_initial();
   const Outcome outcome = solve(0);
   if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
 }

@@ -220,6 +220,22 @@ StokesState StokesOperator::start_state() const {
   StokesState state;
   state.nodes.assign(static_cast<std::size_t>(mesh_->nodes()) * (mesh_->dim + 1), 0.0);
   impose_constraints(state);
+  const auto dim = static_cast<std::size_t>(mesh_->dim);
+  for (std::size_t g = 0; g < gates_.size(); ++g) {
+    std::vector<Real> along = gate_columns_[g].values;
+    Real through = 0;
+    for (std::size_t k = 0; k < gate_columns_[g].nodes.size(); ++k) {
+      constraints_.project(gate_columns_[g].nodes[k], along.data() + k * dim);
+      for (std::size_t d = 0; d < dim; ++d) through += along[k * dim + d] * along[k * dim + d];
+    }
+    through = comm_->sum(through);
+    if (!(through > 0)) continue;
+    for (std::size_t k = 0; k < gate_columns_[g].nodes.size(); ++k) {
+      Real* velocity = state.nodes.data() + static_cast<std::size_t>(gate_columns_[g].nodes[k]) * (dim + 1);
+      for (std::size_t d = 0; d < dim; ++d) velocity[d] += gates_[g].flux / through * along[k * dim + d];
+    }
+  }
+  if (!gates_.empty()) mesh_->node_halo.update_copies(state.nodes, mesh_->dim + 1);
   return state;
 }
 

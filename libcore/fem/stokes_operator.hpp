@@ -92,7 +92,9 @@ class StokesOperator {
   /// Collective.
   void remove_pressure_mean(StokesState& state) const;
 
-  /// A state of zero velocities and pressures that satisfies the constraints. Local.
+  /// A state of zero velocities and pressures that satisfies the constraints, and lets the demanded flux through the
+  /// nodes of each gate: against the forces that this makes a linear solver's tolerance is to be judged, as against
+  /// those of prescribed velocities. Collective.
   StokesState start_state() const;
   /// Puts the prescribed velocities into a state, and the right number of borders. Local.
   void impose_constraints(StokesState& state) const;

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
-#include "base/error.hpp"
-#include "parallel/sparse_exchange.hpp"
+#include "solvers/graph_assembler.hpp"
 
 namespace malleus {
 namespace {
@@ -15,76 +13,31 @@ std::size_t index(LocalId i) {
   return static_cast<std::size_t>(i);
 }
 
-/// A number for an entry of a row that another rank owns.
-struct ForeignEntry {
-  GlobalId row;
-  GlobalId column;
-  Real value;
-};
-
-/// M(1/eta)/2 of this rank's elements on the rows of a graph, with what belongs to rows of other ranks.
-class MassAssembler {
- public:
-  MassAssembler(const LinearSystem& system, const BlockLayout& layout, const BlockGraph& graph,
-                std::vector<float>& values)
-      : system_(system), layout_(layout), graph_(graph), values_(values) {}
-
-  void run(Real scaling) {
-    const Mesh& mesh = *system_.mesh;
-    const Real scale = 0.5 * scaling * system_.pressure_scale * system_.pressure_scale;
-    for (LocalId element = 0; element < mesh.elements(); ++element) {
-      const Real viscosity = system_.element_viscosity[index(element)];
-      if (viscosity > 0) add_element(element, scale * system_.element_volume[index(element)] / viscosity);
-    }
-    for (const auto& [rank, entries] : sparse_exchange(*system_.comm, foreign_)) {
-      for (const ForeignEntry& entry : entries) {
-        add(static_cast<LocalId>(entry.row - layout_.ownership.begin()), layout_.local(entry.column), entry.value);
-      }
-    }
-  }
-
- private:
-  void add_element(LocalId element, Real weight) {
-    const Mesh& mesh = *system_.mesh;
-    const int dim = mesh.dim;
-    const Real entry = weight / ((dim + 1) * (dim + 2));
+/// Adds M(1/eta)/2 times a factor.
+void add_mass(const LinearSystem& system, Real factor, GraphAssembler<float>& assembler) {
+  const Mesh& mesh = *system.mesh;
+  const int dim = mesh.dim;
+  const auto is_fixed = [&](LocalId node) { return system.constraints->is_pressure_fixed(node); };
+  for (LocalId element = 0; element < mesh.elements(); ++element) {
+    const Real viscosity = system.element_viscosity[index(element)];
+    if (!(viscosity > 0)) continue;
+    const Real entry = 0.5 * factor * system.element_volume[index(element)] / viscosity / ((dim + 1) * (dim + 2));
     const auto nodes = mesh.nodes_of_element(element);
     for (const LocalId row : nodes) {
-      if (system_.constraints->is_pressure_fixed(row)) continue;
       for (const LocalId column : nodes) {
-        if (system_.constraints->is_pressure_fixed(column)) continue;
-        const Real value = row == column ? 2 * entry : entry;
-        const GlobalId number = mesh.global_node(column);
-        if (row < mesh.owned_nodes()) {
-          add(row, layout_.local(number), value);
-        } else {
-          const GlobalId row_number = mesh.global_node(row);
-          foreign_[mesh.node_ownership.owner_of(row_number)].push_back({row_number, number, value});
-        }
+        if (!is_fixed(row) && !is_fixed(column)) assembler.add(row, column, row == column ? 2 * entry : entry);
       }
     }
   }
-
-  void add(LocalId row, LocalId column, Real value) {
-    const auto begin = graph_.columns.begin() + graph_.offsets[index(row)];
-    const auto end = graph_.columns.begin() + graph_.offsets[index(row) + 1];
-    const auto place = std::lower_bound(begin, end, column);
-    check(place != end && *place == column, "the nodes of an element are coupled in the matrix");
-    values_[static_cast<std::size_t>(place - graph_.columns.begin())] += static_cast<float>(value);
-  }
-
-  const LinearSystem& system_;
-  const BlockLayout& layout_;
-  const BlockGraph& graph_;
-  std::vector<float>& values_;
-  std::map<int, std::vector<ForeignEntry>> foreign_;
-};
+  assembler.finish();
+}
 
 }  // namespace
 
 PressureBlock::PressureBlock(const LinearSystem& system, const StokesBlocks& blocks, int steps)
     : layout_(blocks.layout), graph_(blocks.graph), steps_(steps), values_(blocks.pressure) {
-  MassAssembler(system, layout_, graph_, values_).run(blocks.scaling);
+  GraphAssembler<float> assembler(system, layout_, graph_, values_);
+  add_mass(system, blocks.scaling * system.pressure_scale * system.pressure_scale, assembler);
   inverse_diagonal_.resize(index(graph_.rows()));
   for (LocalId row = 0; row < graph_.rows(); ++row) {
     const float diagonal = values_[index(graph_.diagonals[index(row)])];

@@ -29,7 +29,6 @@ class PressureBlock {
   void multiply(const float* x, float* y) const;
 
  private:
-  void add_mass(const LinearSystem& system);
   void estimate_bounds(const LinearSystem& system);
 
   const BlockLayout& layout_;

@@ -55,6 +55,7 @@ StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const Pre
     : settings_(settings), operator_(&op), blocks_(extract_blocks(op.system())) {
   const LinearSystem& system = op.system();
   pressure_ = std::make_unique<PressureBlock>(system, blocks_, settings_.chebyshev_steps);
+  lubrication_ = LubricationBlock::make_where_thin(op, blocks_);
   blocks_.pressure = {};
   pressure_residual_.assign(index(blocks_.graph.rows()), 0.0F);
   pressure_correction_.assign(index(blocks_.layout.size()), 0.0F);
@@ -142,13 +143,10 @@ void StokesPreconditioner::solve_velocity(std::vector<Real>& right_side, Real* c
 void StokesPreconditioner::apply(const Real* residual, Real* correction) {
   const auto dim = index(operator_->system().mesh->dim);
   const auto rows = index(blocks_.graph.rows());
-  const Real sign = settings_.positive ? 1.0 : -1.0;
   for (std::size_t node = 0; node < rows; ++node) {
-    pressure_residual_[node] = static_cast<float>(sign * residual[node * (dim + 1) + dim]);
     for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] = residual[node * (dim + 1) + d];
   }
-  pressure_->apply(pressure_residual_.data(), pressure_correction_);
-  add_pockets(residual);
+  const Eigen::VectorXd q = solve_pressures(residual);
   for (std::size_t node = 0; node < rows; ++node) {
     correction[node * (dim + 1) + dim] = blocks_.scaling * static_cast<Real>(pressure_correction_[node]);
     for (LocalId k = settings_.positive ? 0 : blocks_.graph.offsets[node];
@@ -158,15 +156,35 @@ void StokesPreconditioner::apply(const Real* residual, Real* correction) {
       for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] -= static_cast<Real>(gradient[d] * p);
     }
   }
-  const std::vector<Real> rest = operator_->border_values(residual);
-  if (!rest.empty()) {
-    const Eigen::VectorXd q = border_inverse_ * Eigen::Map<const Eigen::VectorXd>(rest.data(), border_inverse_.rows());
+  if (q.size() > 0) {
     if (operator_->system().comm->is_root()) std::copy(q.begin(), q.end(), correction + operator_->node_unknowns());
     if (!settings_.positive) {
       operator_->subtract_borders({q.data(), static_cast<std::size_t>(q.size())}, velocity_residual_.data());
     }
   }
   solve_velocity(velocity_residual_, correction);
+}
+
+/// Fills the pressure's correction, copies included, in the blocks' scaling; returns the borders'.
+Eigen::VectorXd StokesPreconditioner::solve_pressures(const Real* residual) {
+  const auto dim = index(operator_->system().mesh->dim);
+  const Real sign = settings_.positive ? 1.0 : -1.0;
+  std::vector<Real> wanted(index(blocks_.graph.rows()));
+  for (std::size_t node = 0; node < wanted.size(); ++node) {
+    wanted[node] = residual[node * (dim + 1) + dim];
+    pressure_residual_[node] = static_cast<float>(sign * wanted[node]);
+  }
+  const std::vector<Real> rest = operator_->border_values(residual);
+  Eigen::VectorXd q = border_inverse_ * Eigen::Map<const Eigen::VectorXd>(rest.data(), border_inverse_.rows());
+  pressure_->apply(pressure_residual_.data(), pressure_correction_);
+  if (lubrication_) {
+    Eigen::VectorXd along = Eigen::VectorXd::Zero(q.size());
+    lubrication_->add(wanted.data(), rest, sign, pressure_correction_, along);
+    blocks_.layout.halo.update_copies(std::span(pressure_correction_), 1);
+    q += blocks_.scaling * along;
+  }
+  add_pockets(residual);
+  return q;
 }
 
 std::string StokesPreconditioner::summary() const {
@@ -188,6 +206,7 @@ std::string StokesPreconditioner::table() const {
   }
   text += fmt::format("pressure: {} Chebyshev steps on [{:.2f}, {:.2f}]\n", settings_.chebyshev_steps,
                       pressure_->bounds().low, pressure_->bounds().high);
+  if (lubrication_) text += "with the flow along thin sections\n";
   if (!pocket_weights_.empty() || open_regions_ > 0) {
     text +=
         fmt::format("{} closed soft pockets deflated, {} soft regions open\n", pocket_weights_.size(), open_regions_);
@@ -196,8 +215,8 @@ std::string StokesPreconditioner::table() const {
 }
 
 std::size_t StokesPreconditioner::bytes() const {
-  return velocity_->bytes() + pressure_->bytes() + sizeof(float) * blocks_.gradient.values.size() +
-         sizeof(LocalId) * blocks_.graph.columns.size() +
+  return velocity_->bytes() + pressure_->bytes() + (lubrication_ ? lubrication_->bytes() : 0) +
+         sizeof(float) * blocks_.gradient.values.size() + sizeof(LocalId) * blocks_.graph.columns.size() +
          sizeof(Real) * (velocity_residual_.size() + velocity_correction_.size());
 }
 

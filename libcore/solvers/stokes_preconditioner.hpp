@@ -7,6 +7,7 @@
 #include <string>
 
 #include "solvers/bordered_operator.hpp"
+#include "solvers/lubrication_block.hpp"
 #include "solvers/multigrid/velocity_multigrid.hpp"
 #include "solvers/preconditioner_settings.hpp"
 #include "solvers/pressure_block.hpp"
@@ -19,8 +20,9 @@ PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSyst
 
 /// z_p = -(S^-1 + sum_k e_k e_k^T / E_k) r_p, z_q = E^-1 r_q, z_v = A^-1 (r_v - B^T z_p - g z_q): A^-1 one multigrid
 /// cycle, S = M(1/eta)/2 + C by Chebyshev steps, E = d - g^T A^-1 g; e_k is 1 on the nodes of closed soft pocket k, E_k
-/// = 1.5 V_k/eta. With the exact blocks a Krylov method would need a few iterations; it needs 25-30 with these, at any
-/// mesh size. Holds no reference to the system it was made from.
+/// = 1.5 V_k/eta. Where walls make long thin sections, (z_p, z_q) also has the part of LubricationBlock. With the exact
+/// blocks a Krylov method would need a few iterations; it needs 25-30 with these, at any mesh size. Holds no reference
+/// to the system it was made from.
 class StokesPreconditioner {
  public:
   /// settings: resolved. Collective.
@@ -38,12 +40,14 @@ class StokesPreconditioner {
   void find_pockets(const LinearSystem& system);
   void add_pockets(const Real* residual);
   void make_border_block();
+  Eigen::VectorXd solve_pressures(const Real* residual);
   void solve_velocity(std::vector<Real>& right_side, Real* correction);
 
   PreconditionerSettings settings_;
   const BorderedOperator* operator_;
   StokesBlocks blocks_;  ///< without the velocity's values once the multigrid has them
   std::unique_ptr<PressureBlock> pressure_;
+  std::unique_ptr<LubricationBlock> lubrication_;  ///< null where there are no long thin sections
   std::unique_ptr<VelocityMultigrid> velocity_;
   Eigen::MatrixXd border_inverse_;
   std::vector<Real> pocket_weights_;      ///< [pocket] 1/E of its constant pressure, in the blocks' scaling

@@ -79,11 +79,11 @@ Ownership coarse_ownership(const Communicator& comm, LocalId count, const Multig
 template <class T>
 class SmoothedAggregation final : public VelocityMultigrid {
  public:
-  SmoothedAggregation(const Communicator& comm, MultigridLevel finest, const NodeConstraints& constraints,
+  SmoothedAggregation(const Communicator& comm, MultigridLevel finest, const NodeConstraints* constraints,
                       const MultigridSettings& settings)
       : comm_(comm), settings_(settings), dim_(finest.values.rows) {
     MultigridLevel level = std::move(finest);
-    const NodeConstraints* fine_constraints = &constraints;
+    const NodeConstraints* fine_constraints = constraints;
     Real threshold = settings.threshold;
     while (true) {
       summarize(level);
@@ -238,9 +238,14 @@ std::unique_ptr<VelocityMultigrid> make_velocity_multigrid(const Communicator& c
                                                            const NodeConstraints& constraints,
                                                            const MultigridSettings& settings) {
   if (settings.double_precision) {
-    return std::make_unique<SmoothedAggregation<double>>(comm, std::move(finest), constraints, settings);
+    return std::make_unique<SmoothedAggregation<double>>(comm, std::move(finest), &constraints, settings);
   }
-  return std::make_unique<SmoothedAggregation<float>>(comm, std::move(finest), constraints, settings);
+  return std::make_unique<SmoothedAggregation<float>>(comm, std::move(finest), &constraints, settings);
+}
+
+std::unique_ptr<VelocityMultigrid> make_scalar_multigrid(const Communicator& comm, MultigridLevel finest,
+                                                         const MultigridSettings& settings) {
+  return std::make_unique<SmoothedAggregation<float>>(comm, std::move(finest), nullptr, settings);
 }
 
 }  // namespace malleus

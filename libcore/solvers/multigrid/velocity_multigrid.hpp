@@ -47,4 +47,8 @@ std::unique_ptr<VelocityMultigrid> make_velocity_multigrid(const Communicator& c
                                                            const NodeConstraints& constraints,
                                                            const MultigridSettings& settings);
 
+/// The same for one unknown a node: blocks of 1 x 1, points all 0 and as many as owned nodes. Collective.
+std::unique_ptr<VelocityMultigrid> make_scalar_multigrid(const Communicator& comm, MultigridLevel finest,
+                                                         const MultigridSettings& settings);
+
 }  // namespace malleus
