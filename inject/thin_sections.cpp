@@ -78,13 +78,14 @@ ThinSections find_thin_sections(const Scene& scene) {
 void warn_of(const ThinSections& thin) {
   if (thin.below_two > 1e-3) {
     log::warning(
-        "{:.2g} % of the cavity is one element thin between walls: nothing flows there, and nothing is claimed for "
+        "{:.3g} % of the cavity is one element thin between walls: nothing flows there, and nothing is claimed for "
         "it; refine the mesh to 4 elements across",
         100 * thin.below_two);
   }
   if (thin.below_four > 1e-2) {
     log::warning(
-        "{:.2g} % of the cavity has fewer than 4 elements across: pressure drops there are 7 % (3 across) to 30 % (2 "
+        "{:.3g} % of the cavity has fewer than 4 elements across: pressure drops there are up to 4 % (3 across) and 15 "
+        "% (2 "
         "across) too high",
         100 * thin.below_four);
   }

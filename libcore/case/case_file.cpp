@@ -208,6 +208,23 @@ void CaseFile::parse_line(std::string_view line, const Place& place) {
   open_->entries.push_back({key, value, place});
 }
 
+/// "; did you mean 'body.billet'?" for a title near that of a section of the same kind. Short names and names that
+/// differ in digits alone (probe.p1, probe.p2) are taken for new sections.
+std::string CaseFile::nearest_sibling(std::string_view kind, std::string_view name) const {
+  const auto without_digits = [](std::string_view text) {
+    std::string letters;
+    std::copy_if(text.begin(), text.end(), std::back_inserter(letters), [](char c) { return c < '0' || c > '9'; });
+    return letters;
+  };
+  std::vector<std::string> siblings;
+  for (const CaseSection& section : sections_) {
+    const bool is_numbered = without_digits(section.name) == without_digits(name);
+    if (section.kind == kind && !section.name.empty() && !is_numbered) siblings.push_back(section.name);
+  }
+  const std::string nearest = name.size() < 3 ? "" : nearest_name(name, siblings);
+  return nearest.empty() ? "" : fmt::format("; did you mean '{}.{}'?", kind, nearest);
+}
+
 void CaseFile::add_override(const std::string& assignment) {
   const Place place = {"command line", 0};
   const std::size_t equals = assignment.find('=');
@@ -233,6 +250,10 @@ void CaseFile::add_override(const std::string& assignment) {
   auto section = std::find_if(sections_.begin(), sections_.end(),
                               [&](const CaseSection& s) { return s.kind == kind && s.name == name; });
   if (section == sections_.end()) {
+    if (const std::string hint = nearest_sibling(kind, name); !hint.empty()) {
+      mistakes_.add(place, fmt::format("the case has no section [{}]{}", title, hint));
+      return;
+    }
     open_section(title, place);
     section = std::prev(sections_.end());
   }

@@ -81,6 +81,7 @@ class CaseFile {
   void parse_line(std::string_view line, const Place& place);
   void open_section(std::string_view title, const Place& place);
   void add_override(const std::string& assignment);
+  std::string nearest_sibling(std::string_view kind, std::string_view name) const;
 
   std::filesystem::path path_;
   std::vector<CaseSection> sections_;

@@ -20,6 +20,14 @@ struct OptionTexts {
       "85 stopped with a checkpoint (run again with --restart).";
 };
 
+CLI::Validator whole_number() {
+  const auto check = [](const std::string& text) {
+    const bool is_whole = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+    return is_whole ? std::string() : fmt::format("'{}' is no whole number of 0 or more", text);
+  };
+  return {check, "", "whole number"};
+}
+
 void add_options(CLI::App& app, CommandLine& line) {
   app.add_option("CASE.ini", line.case_file, "The case file");
   app.add_option("-o,--output", line.output, "Directory for all files (default: [output] directory, else ./out/NAME)")
@@ -29,9 +37,7 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->allow_extra_args(false);
   app.add_flag("--check", line.check, "Reads and validates all, prints the plan, runs nothing");
   app.add_flag("--restart", line.restart, "Goes on from the newest complete checkpoint of the output directory");
-  app.add_option("--steps", line.steps, "Stops cleanly after N more increments")
-      ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+  app.add_option("--steps", line.steps, "Stops cleanly after N more increments")->type_name("N")->check(whole_number());
   app.add_option("--help-case", line.help_case, "Prints every section and key of a case, or those of one section")
       ->type_name("[SECTION]")
       ->expected(0, 1)

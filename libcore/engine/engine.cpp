@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "engine/petsc_options.hpp"
 #include "engine/report.hpp"
 #include "engine/resources.hpp"
 #include "parallel/agreement.hpp"
@@ -334,6 +335,9 @@ std::string Engine::reason_to_stop() {
 }
 
 void Engine::finish(const std::string& status, int code) {
+  for (const std::string& option : unused_petsc_options()) {
+    log::warning("command line: nothing asked for the PETSc option {}", option);
+  }
   if (last_output_ != last_.number || code == exit_code::numerics) write_fields(last_.number);
   write_summary(status, code);
   print_timings();

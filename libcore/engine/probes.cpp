@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "base/error.hpp"
+#include "base/log.hpp"
 #include "engine/history.hpp"
 #include "field/point_locator.hpp"
 #include "parallel/agreement.hpp"
@@ -147,11 +148,20 @@ void Probes::resume(const std::filesystem::path& directory, const FieldStore& fi
   });
 }
 
+/// Once for each probe: its cells stay empty.
+void Probes::warn_of_points_outside(const Probe& probe, const std::vector<char>& found) {
+  const auto outside = std::count(found.begin(), found.end(), 0);
+  if (outside == 0 || !warned_of_.insert(probe.settings.name).second) return;
+  log::warning("[probe.{}]: outside the mesh: {} of {} points; their cells are left empty", probe.settings.name,
+               outside, found.size());
+}
+
 void Probes::record(Real time, const Mesh& mesh, const FieldStore& fields) {
   for (const Probe& probe : probes_) {
     const std::vector<const Field*> chosen = fields_of(probe, fields);
     const PointValues values = values_at_points(comm_, mesh, chosen, probe.points);
     const std::size_t count = values.found.size();
+    warn_of_points_outside(probe, values.found);
     const std::size_t width = count > 0 ? values.values.size() / count : 0;
     on_root(comm_, [&] {
       std::string text;

@@ -3,6 +3,7 @@
 /// Points at which fields are recorded: probe-NAME.csv.
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -48,7 +49,10 @@ class Probes {
   const Communicator& comm_;
   int dim_ = 3;
   std::filesystem::path directory_;
+  void warn_of_points_outside(const Probe& probe, const std::vector<char>& found);
+
   std::vector<Probe> probes_;
+  std::set<std::string> warned_of_;  ///< probes with points outside
 };
 
 /// Carries the points that go with the material. Stands after the flow and before the motion of the mesh.

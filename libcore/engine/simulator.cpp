@@ -6,6 +6,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "base/text.hpp"
 #include "case/help.hpp"
 #include "engine/command_line.hpp"
 #include "engine/engine.hpp"
@@ -83,7 +84,23 @@ void check_output_fields(const Process& process, const CommonSections& common, C
         name == "region" || name == "partition" || std::find(known.begin(), known.end(), name) != known.end();
     if (!is_known) {
       reader.fail("output", "fields",
-                  fmt::format("'{}' is no field of this scene; it has {}", name, fmt::join(known, ", ")));
+                  fmt::format("'{}' is no field of this scene{}; it has {}", name, did_you_mean(name, known),
+                              fmt::join(known, ", ")));
+    }
+  }
+}
+
+/// Fields of probes that the scene does not have.
+void check_probe_fields(Process& process, const CommonSections& common, CaseReader& reader) {
+  const FieldStore& fields = process.fields();
+  std::vector<std::string> known;
+  for (const Field* field : fields.all()) known.push_back(field->spec().name);
+  for (const ProbeSettings& probe : common.probes) {
+    for (const std::string& name : probe.fields) {
+      if (fields.has(name)) continue;
+      reader.fail("probe." + probe.name, "fields",
+                  fmt::format("'{}' is no field of this scene{}; it has {}", name, did_you_mean(name, known),
+                              fmt::join(known, ", ")));
     }
   }
 }
@@ -104,6 +121,7 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   RunSettings settings = run_settings(line, simulator);
   const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
   check_output_fields(*process, common, reader);
+  check_probe_fields(*process, common, reader);
   reader.check_mesh(names);
   settings.resolved_case = reader.resolved(settings.directory);
   return Engine(comm, *process, std::move(settings)).run();

@@ -142,6 +142,43 @@ class WrongInput(unittest.TestCase):
             self.assertEqual(sorted(path.name for path in pathlib.Path(directory).iterdir()), ["case.ini", "square.msh"],
                              "a refused case writes nothing")
 
+    def test_probes_of_unknown_fields(self):
+        probe = "[probe.p]\npoint = 0.5 0.5 m\n>fields = presure\n"
+        for program in PROGRAMS:
+            for ranks in (1, 3):
+                with self.subTest(program, ranks=ranks):
+                    self.check_refused(program, CASES[program] + probe, ["case.ini:{n}: [probe.p] fields = presure", "no field",
+                                                                         "did you mean 'pressure'?"], ranks=ranks)
+
+    def test_overrides_of_misspelt_sections(self):
+        for program in PROGRAMS:
+            with self.subTest(program):
+                title = BODY[program]
+                self.check_refused(program, CASES[program], ["command line", f"did you mean '{title}'?"],
+                                   arguments=["-D", f"{title}x.density=1"])
+
+    def test_meshes_that_cover_a_place_twice(self):
+        overlapping = MESH.replace("$Nodes\n4\n", "$Nodes\n5\n5 0.5 0.2 0\n").replace("$Elements\n6\n", "$Elements\n7\n")
+        overlapping = overlapping.replace("$EndElements", "7 2 2 5 5 1 3 5\n$EndElements")
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks), tempfile.TemporaryDirectory() as directory:
+                case = pathlib.Path(directory) / "case.ini"
+                case.write_text(CASES["forge"])
+                (pathlib.Path(directory) / "square.msh").write_text(overlapping)
+                result = run("forge", case, cwd=directory, ranks=ranks)
+                self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+                self.assertRegex(result.stderr, r"square\.msh: the mesh is not sound: 1 faces belong to more than two elements")
+
+    def test_probes_outside_and_unused_options_are_warned_of(self):
+        with tempfile.TemporaryDirectory() as directory:
+            case = pathlib.Path(directory) / "case.ini"
+            case.write_text(CASES["forge"] + "[probe.far]\npoint = 5 5 m\n")
+            (pathlib.Path(directory) / "square.msh").write_text(MESH)
+            result = run("forge", case, "--", "-ksp_foo", "3", cwd=directory, ranks=2)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("[probe.far]: outside the mesh: 1 of 1 points", result.stderr)
+            self.assertIn("nothing asked for the PETSc option -ksp_foo 3", result.stderr)
+
     def test_the_sound_case_passes(self):
         for program in PROGRAMS:
             with self.subTest(program), tempfile.TemporaryDirectory() as directory:

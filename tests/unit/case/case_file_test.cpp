@@ -104,6 +104,14 @@ TEST(CaseFile, OverridesWinAndCreate) {
   EXPECT_EQ(value_of(file, "new", "note"), "\"a ; b\"");
 }
 
+TEST(CaseFile, RefusesOverridesOfSectionsWithMisspeltNames) {
+  const char* text = "[body.billet]\nx = 1\n[probe.point1]\nx = 1\n";
+  const CaseFile misspelt = CaseFile::parse(text, "test.ini", {"body.bilet.x=2"});
+  ASSERT_EQ(misspelt.mistakes().list().size(), 1U);
+  EXPECT_NE(misspelt.mistakes().list()[0].message.find("did you mean 'body.billet'?"), std::string::npos);
+  EXPECT_TRUE(CaseFile::parse(text, "test.ini", {"probe.point2.x=2", "body.die.x=3"}).mistakes().empty());
+}
+
 TEST(CaseFile, RefusesMalformedOverrides) {
   const CaseFile file = CaseFile::parse("[time]\nend = 3\n", "test.ini",
                                         {"", "time", "end=3", "time.end", ".end=3", "time.=3", "a b.c=3",
