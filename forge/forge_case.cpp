@@ -135,7 +135,6 @@ void ForgeCase::validate(CaseReader& reader) const {
   refuse(common.thermal.has_value(), "thermal", "forge models no heat yet; remove the section");
   refuse(common.inertia.has_value(), "inertia", "forge models no inertia yet; remove the section");
   refuse(common.air.has_value(), "air", "forge models no trapped air; remove the section");
-  refuse(common.remesh.has_value() && common.remesh->active, "remesh", "forge does not remesh yet; set active = no");
   refuse(initial.has_value() && !initial->from.empty(), "initial", "forge does not start from another run yet");
   if (!time.end && !time.increments && !time.stroke) {
     reader.fail("time", "end", "nothing ends the run: give end, increments or stroke");

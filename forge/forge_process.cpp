@@ -36,6 +36,7 @@ PressState press_state(const nlohmann::json& json) {
 
 ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
     : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
+  if (case_.common.remesh && case_.common.remesh->active) remeshing_.emplace(*case_.common.remesh, remeshed_scene());
   if (case_.common.reference) errors_.emplace(*scene_, flow_, *case_.common.reference);
   if (case_.common.probes.empty()) return;
   probes_.emplace(*scene_->comm, scene_->mesh, case_.common.probes);
@@ -43,11 +44,34 @@ ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> s
 }
 
 std::vector<Component*> ForgeProcess::components() {
-  std::vector<Component*> list = {&flow_};
+  std::vector<Component*> list;
+  if (remeshing_) list.push_back(&*remeshing_);
+  list.push_back(&flow_);
   if (errors_) list.push_back(&*errors_);
   if (tracers_) list.push_back(&*tracers_);
   list.push_back(&motion_);
   return list;
+}
+
+RemeshedScene ForgeProcess::remeshed_scene() {
+  RemeshedScene lent;
+  lent.comm = scene_->comm;
+  lent.mesh = &scene_->mesh;
+  lent.fields = &scene_->fields;
+  lent.flow_field = field_name::velocity;
+  lent.keep_volume = true;
+  for (const Body& body : scene_->bodies) lent.kept_regions.push_back(body.is_deformable() ? 0 : 1);
+  lent.mesh_changed = [this] { mesh_changed(); };
+  return lent;
+}
+
+/// A remesh moves free surfaces within their curvature and ends the history of the time scheme.
+void ForgeProcess::mesh_changed() {
+  scene_->boundaries->mesh_changed();
+  flow_.mesh_changed();
+  scene_->progress.last_step = 0;
+  const std::vector<Real> volumes = body_volumes(*scene_);
+  for (std::size_t i = 0; i < scene_->bodies.size(); ++i) scene_->bodies[i].volume = volumes[i];
 }
 
 std::vector<LeftOut> ForgeProcess::left_out() const {
@@ -57,7 +81,7 @@ std::vector<LeftOut> ForgeProcess::left_out() const {
   if (!case_.common.thermal) list.push_back({"heat equation", "no [thermal] section"});
   if (!case_.common.inertia) list.push_back({"inertia", "no [inertia] section"});
   if (!case_.common.gravity) list.push_back({"gravity", "no [gravity] section"});
-  if (!case_.common.remesh) list.push_back({"remeshing", "no [remesh] section"});
+  if (!remeshing_) list.push_back({"remeshing", case_.common.remesh ? "[remesh] active = no" : "no [remesh] section"});
   for (const Body& body : scene_->bodies) {
     if (!body.is_deformable()) list.push_back({"deformation of " + body.name, "law = rigid: no unknowns"});
   }
@@ -234,7 +258,8 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
   newton_total_ += report.newton_iterations;
   ++increments_;
   std::vector<HistoryCell> row = {static_cast<Real>(report.newton_iterations), volume_change(),
-                                  smallest_quality(*scene_), report.max_penetration, 0.0};
+                                  smallest_quality(*scene_), report.max_penetration,
+                                  remeshing_ && remeshing_->remeshed() ? 1.0 : 0.0};
   for (const Opponent& one : opponents()) {
     const Vector force = force_on(one);
     for (int c = 0; c < scene_->dim(); ++c) row.emplace_back(force[c]);
@@ -299,6 +324,7 @@ nlohmann::json ForgeProcess::save_state() const {
                           {"newton_total", newton_total_},
                           {"edge_rate", flow_.largest_edge_rate()},
                           {"strain_rate", flow_.largest_strain_rate()}};
+  if (remeshing_) state["remeshing"] = remeshing_->save();
   for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
   for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
   return state;
@@ -327,6 +353,7 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   scene_->boundaries->mesh_changed();
   flow_.mesh_changed();
   flow_.set_rates(state.at("edge_rate"), state.at("strain_rate"));
+  if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
   const std::vector<Real> volumes = body_volumes(*scene_);
   for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
     scene_->bodies[i].start_volume = state.at("start_volumes").at(i);

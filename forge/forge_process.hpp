@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "engine/process.hpp"
+#include "engine/remeshing.hpp"
 #include "forge/known_errors.hpp"
 #include "forge/motion.hpp"
 
@@ -55,11 +56,14 @@ class ForgeProcess final : public Process {
   Real leading_speed() const;
   Real planned_strain() const;
   Real volume_change() const;
+  RemeshedScene remeshed_scene();
+  void mesh_changed();
 
   const ForgeCase& case_;
   std::unique_ptr<Scene> scene_;
   std::optional<Probes> probes_;
   ContactFlow flow_;
+  std::optional<Remeshing> remeshing_;
   std::optional<KnownErrors> errors_;
   std::optional<TracerMotion> tracers_;
   Motion motion_;

@@ -142,8 +142,16 @@ class DistributedRemesher {
     timed("remesh", [&] { remesh(std::vector<std::uint8_t>(index(mesh_.elements()), 1), options); });
   }
 
-  void remesh(const std::vector<std::uint8_t>& selected, const RemeshOptions& options) {
+  void leave_out_kept(std::vector<std::uint8_t>& selected) const {
+    if (options_.kept_regions.empty()) return;
+    for (std::size_t e = 0; e < selected.size(); ++e) {
+      if (options_.kept_regions[static_cast<std::size_t>(mesh_.element_region[e])] != 0) selected[e] = 0;
+    }
+  }
+
+  void remesh(std::vector<std::uint8_t> selected, const RemeshOptions& options) {
     const auto start = std::clock();
+    leave_out_kept(selected);
     const auto mine = static_cast<GlobalId>(std::count(selected.begin(), selected.end(), 1));
     const RemeshReport local = remesh_selection(comm_, mesh_, fields_, selected, uniform_, options);
     RemeshRound round;

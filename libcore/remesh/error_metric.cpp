@@ -153,7 +153,81 @@ Metric error_metric_of(const Communicator& comm, const Mesh& mesh, const Field& 
   return metric;
 }
 
+/// Squares of the gradient and of its distance to the recovered one, integrated over each element.
+template <int D>
+struct GradientErrors {
+  std::vector<Real> squares;  ///< [element] of the error
+  Real norm = 0;              ///< square of the gradient's norm over all ranks
+};
+
+template <int D>
+GradientErrors<D> gradient_errors(const Communicator& comm, const Mesh& mesh, const Field& field) {
+  const int components = field.components();
+  const std::vector<Real> recovered = recovered_gradients<D>(mesh, field.values(), components);
+  GradientErrors<D> errors;
+  std::vector<Real> here(static_cast<std::size_t>(components * D));
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    const auto p1 = p1_gradients<D>(simplex_points<D>(mesh, e));
+    std::fill(here.begin(), here.end(), 0.0);
+    const auto nodes = mesh.nodes_of_element(e);
+    for (int k = 0; k <= D; ++k) {
+      for (int c = 0; c < components; ++c) {
+        for (int i = 0; i < D; ++i)
+          here[static_cast<std::size_t>(c * D + i)] +=
+              field.at(nodes[static_cast<std::size_t>(k)])[c] * p1.gradients(i, k);
+      }
+    }
+    Real square = 0;
+    Real norm = 0;
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      norm += here[i] * here[i];
+      for (const LocalId node : nodes) {
+        const Real away = recovered[index(node) * here.size() + i] - here[i];
+        square += away * away / (D + 1);
+      }
+    }
+    errors.squares.push_back(square * std::abs(p1.volume));
+    errors.norm += norm * std::abs(p1.volume);
+  }
+  errors.norm = comm.sum(errors.norm);
+  return errors;
+}
+
+template <int D>
+Metric error_sizes_of(const Communicator& comm, const Mesh& mesh, const Field& field, Real error,
+                      const ErrorMetricOptions& options) {
+  constexpr Real largest_growth = 4;
+  constexpr Real power = 1.0 / (2 + D);  // of the squared error of an element, for first order
+  const GradientErrors<D> errors = gradient_errors<D>(comm, mesh, field);
+  Metric sizes = current_sizes(comm, mesh);
+  if (!(errors.norm > 0)) return sizes;
+  Real sum = 0;
+  for (const Real square : errors.squares) sum += std::pow(square, D * power);
+  const Real allowed = error * std::sqrt(errors.norm) / std::sqrt(std::max(comm.sum(sum), 1e-300));
+  // The smallest ratio of new to old size among the elements at a node.
+  std::vector<Real> ratio(index(mesh.nodes()), largest_growth);
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    const Real eta = std::pow(errors.squares[index(e)], power);
+    const Real here = eta * largest_growth > allowed ? allowed / eta : largest_growth;
+    for (const LocalId node : mesh.nodes_of_element(e)) ratio[index(node)] = std::min(ratio[index(node)], here);
+  }
+  mesh.node_halo.min_to_owners(std::span(ratio), 1);
+  mesh.node_halo.update_copies(std::span(ratio), 1);
+  for (std::size_t node = 0; node < ratio.size(); ++node) {
+    sizes.values()[node] = std::clamp(sizes.values()[node] * std::max(ratio[node], 1.0 / largest_growth),
+                                      options.smallest, options.largest);
+  }
+  return sizes;
+}
+
 }  // namespace
+
+Metric error_sizes(const Communicator& comm, const Mesh& mesh, const Field& field, Real error,
+                   const ErrorMetricOptions& options) {
+  check(field.spec().support == Support::node, "error sizes are of node fields");
+  return mesh.dim == 2 ? error_sizes_of<2>(comm, mesh, field, error, options)
+                       : error_sizes_of<3>(comm, mesh, field, error, options);
+}
 
 Metric error_metric(const Communicator& comm, const Mesh& mesh, const Field& field, Real nodes,
                     const ErrorMetricOptions& options) {

@@ -21,4 +21,11 @@ struct ErrorMetricOptions {
 Metric error_metric(const Communicator& comm, const Mesh& mesh, const Field& field, Real nodes,
                     const ErrorMetricOptions& options);
 
+/// Sizes for which the estimated relative error of a field's gradient in L2 is `error`, spread evenly over the
+/// elements. The estimate (Zienkiewicz and Zhu 1987) is the distance of the gradient to its recovered mean at the
+/// nodes; sizes by Diez and Huerta (1999) for an error of first order. Where the field is linear: `largest`, but no
+/// more than four times the present size. Collective.
+Metric error_sizes(const Communicator& comm, const Mesh& mesh, const Field& field, Real error,
+                   const ErrorMetricOptions& options);
+
 }  // namespace malleus
