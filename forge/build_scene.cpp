@@ -23,10 +23,7 @@ std::vector<Body> read_bodies(const Mesh& mesh, const ForgeCase& forge_case) {
     const int region = mesh.find_region(settings.group);
     check(region >= 0, "the groups of bodies are in the mesh");
     Body& body = bodies[static_cast<std::size_t>(region)];
-    if (!body.name.empty()) {
-      throw InputError("[body." + settings.name + "] group = " + settings.group + " is already that of [body." +
-                       body.name + "]");
-    }
+    check(body.name.empty(), "no two bodies share a group");
     body.name = settings.name;
     body.law = settings.law;
     body.consistency = settings.coefficient();

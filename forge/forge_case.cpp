@@ -115,6 +115,25 @@ void PenaltySettings::describe(Section& s) {
       .by_level(1e-2, 1e-2, 1e-3, 1e-3);
 }
 
+namespace {
+
+/// Two sections of one kind must not share a group of the mesh. Both are named with their lines.
+template <class Settings>
+void refuse_shared_groups(CaseReader& reader, const std::string& kind, const std::vector<Settings>& sections) {
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (sections[i].group.empty() || sections[i].group != sections[j].group) continue;
+      const CaseEntry* first = reader.file().find_entry(kind, sections[j].name, "group");
+      const std::string place = first != nullptr ? " (" + first->place.text() + ")" : "";
+      reader.fail(kind + "." + sections[i].name, "group",
+                  "is already that of [" + kind + "." + sections[j].name + "]" + place);
+      break;
+    }
+  }
+}
+
+}  // namespace
+
 void ForgeCase::describe(CaseReader& reader) {
   common.describe_start(reader);
   reader.section("time", time, "when the run ends, and its largest step");
@@ -136,6 +155,11 @@ void ForgeCase::validate(CaseReader& reader) const {
   refuse(common.inertia.has_value(), "inertia", "forge models no inertia yet; remove the section");
   refuse(common.air.has_value(), "air", "forge models no trapped air; remove the section");
   refuse(initial.has_value() && !initial->from.empty(), "initial", "forge does not start from another run yet");
+  if (common.reference && common.reference->level_set) {
+    reader.fail("reference", "level_set", "forge has no level set; remove the key");
+  }
+  refuse_shared_groups(reader, "body", bodies);
+  refuse_shared_groups(reader, "boundary", common.boundaries);
   if (!time.end && !time.increments && !time.stroke) {
     reader.fail("time", "end", "nothing ends the run: give end, increments or stroke");
   }

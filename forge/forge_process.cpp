@@ -248,6 +248,9 @@ std::vector<std::string> ForgeProcess::history_columns() const {
     for (int c = 0; c < scene_->dim(); ++c) columns.push_back(fmt::format("force_{}_{}_N", one.name, "xyz"[c]));
     columns.push_back(fmt::format("stroke_{}_m", one.name));
   }
+  if (errors_) {
+    for (std::string& name : errors_->columns()) columns.push_back(std::move(name));
+  }
   return columns;
 }
 
@@ -264,6 +267,10 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
     const Vector force = force_on(one);
     for (int c = 0; c < scene_->dim(); ++c) row.emplace_back(force[c]);
     row.emplace_back(stroke_of(one));
+  }
+  if (errors_ && !errors_->columns().empty()) {
+    const nlohmann::json& errors = errors_->errors();
+    for (const std::string& name : errors_->columns()) row.emplace_back(Real(errors.at(name)));
   }
   return row;
 }

@@ -100,6 +100,11 @@ void ErrorSums<D>::add_velocity(LocalId element) {
     const Real weight = weight_at(point, share);
     gradient[0] += weight * (slope - exact).squaredNorm();
     gradient[1] += weight * exact.squaredNorm();
+    if (geometry_ != Geometry::axisymmetric) continue;
+    const Real known_hoop = known_velocity(point)[0] / point[0];
+    const Real hoop = values.row(0).dot(phi) / point[0];
+    gradient[0] += weight * (hoop - known_hoop) * (hoop - known_hoop);
+    gradient[1] += weight * known_hoop * known_hoop;
   }
 }
 

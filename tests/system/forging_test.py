@@ -169,6 +169,65 @@ class Upsetting(Forging):
         self.assertAlmostEqual(forces[1] / forces[0], 1, delta=1e-8)
 
 
+class Reference(Forging):
+    """Homogeneous flows lie in the space of the elements: their errors are those of the solver."""
+    SHARP = "[solver]\nnewton_tolerance = 1e-9\nlinear_tolerance = 1e-11\n"
+
+    def test_a_revolved_upsetting_meets_its_known_solution(self):
+        # v = (r/2, -z) V/H; |grad v|^2 = 1/4 + 1/4 + 1 over the volume pi of the cylinder
+        box_mesh(self.directory / "box.msh", 2, cells=(4, 4))
+        text = case_text(0.3, 2, 1, "boundaries", time="increments = 2\nstep = 0.01").replace(symmetries(2, 1), "")
+        text = "[case]\ngeometry = axisymmetric\n" + text + self.SHARP
+        # The height is 1 - t: rates at the start of an increment, when forces and fields are taken, follow it.
+        good = '[reference]\nvelocity_x = "x/2/(1-t)"\nvelocity_y = "-y/(1-t)"\n'
+        off = '[reference]\nvelocity_x = "x"\nvelocity_y = "-y"\n'
+        for ranks in (1, 3):
+            self.forge(text + good, "-D", "motion.volume_target=no", ranks=ranks)
+            errors = summary(self.directory / "out")["accuracy"]["errors"]
+            self.assertLess(errors["velocity_l2"], 1e-4)  # the height after one step of a second-order scheme
+            self.assertLess(errors["velocity_h1_relative"], 1e-4)
+            rows = self.forge(text + off, "-D", "reference.at=every", "-D", "time.increments=1", ranks=ranks)
+            # error of the gradients: 1/2 in two of them; known: 1, 1, 1
+            self.assertAlmostEqual(rows[0]["velocity_h1"] / math.sqrt(0.5 * math.pi), 1, delta=1e-6)
+            errors = summary(self.directory / "out")["accuracy"]["errors"]
+            self.assertAlmostEqual(errors["velocity_h1"], rows[0]["velocity_h1"], delta=1e-15)
+            self.assertAlmostEqual(errors["velocity_h1_relative"], math.sqrt(0.5 / 3), delta=1e-6)
+            # error of the values: r/2, integral of r^2/4 2 pi r = pi/8
+            self.assertAlmostEqual(rows[0]["velocity_l2"] / math.sqrt(math.pi / 8), 1, delta=1e-6)
+
+    def test_errors_are_in_the_history_only_where_asked(self):
+        box_mesh(self.directory / "box.msh", 2)
+        text = case_text(0.3, 2, 1, "boundaries") + '[reference]\nvelocity_x = "x"\nvelocity_y = "-y"\n'
+        self.assertNotIn("velocity_l2", self.forge(text)[0])
+        self.assertLess(self.forge(text, "-D", "reference.at=every")[0]["velocity_l2"], 1e-3)
+
+
+class WrongScenes(Forging):
+    def refused(self, text, *parts, ranks=(1, 2)):
+        (self.directory / "case.ini").write_text(text)
+        for count in ranks:
+            result = run("forge", self.directory / "case.ini", self.directory / "out", ranks=count, check=False)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            for part in parts:
+                self.assertIn(part, result.stderr)
+
+    def test_two_sections_of_a_group_are_refused_with_both_lines(self):
+        box_mesh(self.directory / "box.msh", 2)
+        text = case_text(0.3, 2, 1, "boundaries")
+        line = text[:text.index("group = billet_y_high")].count("\n") + 1
+        second = text + "[boundary.again]\ngroup = billet_y_high\ntraction = 0 1 Pa\n"
+        self.refused(second, f"case.ini:{second.count(chr(10)) - 1}: [boundary.again] group = billet_y_high",
+                     f"already that of [boundary.high] (", f"case.ini:{line})")
+        self.refused(text + "[body.other]\ngroup = billet\nlaw = rigid\n", "[body.other] group = billet",
+                     "already that of [body.billet] (")
+
+    def test_forces_without_a_finite_value_are_refused_on_all_ranks(self):
+        box_mesh(self.directory / "box.msh", 2, cells=(8, 8))
+        for expression in ("1/(x-0.5)", "sqrt(x-0.9)"):
+            self.refused(case_text(0.3, 2, 1, "boundaries") + f'[body_force]\ny = "{expression}"\n',
+                         "[body_force] y", ranks=(1, 2, 4))
+
+
 class Contact(Forging):
     def blocks(self, dim, lower_cells, upper_cells, time="increments = 1\nstep = 1e-3", consistency=K):
         mesh = BoxMesh(dim)
