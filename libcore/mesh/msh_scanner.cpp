@@ -130,6 +130,12 @@ class Scanner {
   void read_names();
   void read_entities();
   void scan_nodes2();
+  /// How many blocks a section of version 4.1 has, and how many nodes or elements in all.
+  struct BlockCounts {
+    GlobalId blocks;
+    GlobalId announced;
+  };
+  BlockCounts block_counts(const char* what);
   void scan_nodes4();
   void scan_elements2();
   void scan_elements2_binary(GlobalId count);
@@ -224,12 +230,17 @@ void Scanner::scan_nodes2() {
   layout_.nodes.push_back(stretch);
 }
 
-void Scanner::scan_nodes4() {
-  Header sizes = header("the header of $Nodes");
+Scanner::BlockCounts Scanner::block_counts(const char* what) {
+  Header sizes = header(what);
   const GlobalId blocks = sizes.get_count();
   const GlobalId announced = sizes.get_count();
   sizes.get<std::int64_t>();
   sizes.get<std::int64_t>();
+  return {blocks, announced};
+}
+
+void Scanner::scan_nodes4() {
+  const auto [blocks, announced] = block_counts("the header of $Nodes");
   GlobalId found = 0;
   for (GlobalId b = 0; b < blocks; ++b) {
     Header block = header("the header of a block of nodes");
@@ -299,11 +310,7 @@ void Scanner::scan_elements2_binary(GlobalId count) {
 }
 
 void Scanner::scan_elements4() {
-  Header sizes = header("the header of $Elements");
-  const GlobalId blocks = sizes.get_count();
-  const GlobalId announced = sizes.get_count();
-  sizes.get<std::int64_t>();
-  sizes.get<std::int64_t>();
+  const auto [blocks, announced] = block_counts("the header of $Elements");
   GlobalId found = 0;
   for (GlobalId b = 0; b < blocks; ++b) {
     const GlobalId header_at = file_.position();

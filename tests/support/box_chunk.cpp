@@ -8,6 +8,13 @@
 
 namespace malleus::test {
 
+BoxMeshOptions small_box(int dim) {
+  BoxMeshOptions box;
+  box.dim = dim;
+  box.cells = {5, 4, 3};
+  return box;
+}
+
 GlobalId renumbered(GlobalId number) {
   return 17 + number * 3 + number / 7 * 1000000;
 }

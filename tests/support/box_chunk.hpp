@@ -5,6 +5,9 @@
 
 namespace malleus::test {
 
+/// 5 x 4 cells, in space times 3.
+BoxMeshOptions small_box(int dim);
+
 /// Sparse node numbers, with a large stride between blocks. Local.
 GlobalId renumbered(GlobalId number);
 

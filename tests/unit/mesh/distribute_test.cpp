@@ -20,14 +20,8 @@ using test::box_chunk;
 using test::box_mesh;
 using test::BoxMeshOptions;
 using test::renumbered;
+using test::small_box;
 using test::world;
-
-BoxMeshOptions small_box(int dim) {
-  BoxMeshOptions box;
-  box.dim = dim;
-  box.cells = {5, 4, 3};
-  return box;
-}
 
 /// Moves everything that the ranks read to one of them.
 MeshChunk all_on_rank(const BoxMeshOptions& options, int rank) {

@@ -11,16 +11,9 @@ namespace malleus {
 namespace {
 
 using test::box_chunk;
-using test::BoxMeshOptions;
 using test::renumbered;
+using test::small_box;
 using test::world;
-
-BoxMeshOptions small_box(int dim) {
-  BoxMeshOptions box;
-  box.dim = dim;
-  box.cells = {5, 4, 3};
-  return box;
-}
 
 /// kind -> count.
 using Counts = std::map<std::string, GlobalId>;
