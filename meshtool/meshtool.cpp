@@ -54,6 +54,7 @@ std::span<const Command> commands() {
       Command{"check", "lists what is wrong with a mesh; exit code 2 where it is not sound", run_check},
       Command{"convert", "writes a mesh, or meshes a CAD file, in another format", run_convert},
       Command{"refine", "brings a mesh to other sizes: finer, coarser, graded, anisotropic", run_refine},
+      Command{"partition", "divides a mesh among equal or unequal processors", run_partition},
   };
   return list;
 }

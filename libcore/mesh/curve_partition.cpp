@@ -42,16 +42,29 @@ SortedItems sort_items(std::span<const std::uint64_t> keys, std::span<const Glob
   return sorted;
 }
 
-/// Share of rank boundary i of the total weight, without overflow for totals up to 2^62.
-GlobalId weight_before_rank(GlobalId total, int i, int ranks) {
-  return total / ranks * i + total % ranks * i / ranks;
+/// Weight that lies before each boundary between ranks, without overflow for totals up to 2^62.
+std::vector<GlobalId> equal_bounds(GlobalId total, int ranks) {
+  std::vector<GlobalId> bounds;
+  for (int i = 1; i < ranks; ++i) bounds.push_back(total / ranks * i + total % ranks * i / ranks);
+  return bounds;
 }
 
-/// cuts[i]: the largest key such that no more than the weight of the ranks 0..i lies below it.
-std::vector<std::uint64_t> find_cuts(const Communicator& comm, const SortedItems& items) {
-  const int ranks = comm.size();
-  const GlobalId total = comm.sum(items.weight_before.back());
-  std::vector<std::uint64_t> cuts(static_cast<std::size_t>(ranks) - 1, 0);
+std::vector<GlobalId> bounds_of_shares(GlobalId total, std::span<const Real> shares) {
+  const Real sum = std::accumulate(shares.begin(), shares.end(), Real{0});
+  check(sum > 0, "some part has a share");
+  std::vector<GlobalId> bounds;
+  Real before = 0;
+  for (std::size_t i = 0; i + 1 < shares.size(); ++i) {
+    before += shares[i];
+    bounds.push_back(static_cast<GlobalId>(static_cast<Real>(total) * std::min(1.0, before / sum)));
+  }
+  return bounds;
+}
+
+/// cuts[i]: the largest key such that no more than bounds[i] lies below it.
+std::vector<std::uint64_t> find_cuts(const Communicator& comm, const SortedItems& items,
+                                     std::span<const GlobalId> bounds) {
+  std::vector<std::uint64_t> cuts(bounds.size(), 0);
   std::vector<GlobalId> below(cuts.size());
   if (cuts.empty()) return cuts;
   for (int bit = key_bits - 1; bit >= 0; --bit) {
@@ -59,10 +72,18 @@ std::vector<std::uint64_t> find_cuts(const Communicator& comm, const SortedItems
     for (std::size_t i = 0; i < cuts.size(); ++i) below[i] = items.weight_below(cuts[i] + step);
     comm.sum_in_place(std::span(below));
     for (std::size_t i = 0; i < cuts.size(); ++i) {
-      if (below[i] <= weight_before_rank(total, static_cast<int>(i) + 1, ranks)) cuts[i] += step;
+      if (below[i] <= bounds[i]) cuts[i] += step;
     }
   }
   return cuts;
+}
+
+std::vector<int> cut_at(std::span<const std::uint64_t> keys, const std::vector<std::uint64_t>& cuts) {
+  std::vector<int> parts(keys.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    parts[i] = static_cast<int>(std::upper_bound(cuts.begin(), cuts.end(), keys[i]) - cuts.begin());
+  }
+  return parts;
 }
 
 }  // namespace
@@ -70,12 +91,15 @@ std::vector<std::uint64_t> find_cuts(const Communicator& comm, const SortedItems
 std::vector<int> curve_partition(const Communicator& comm, std::span<const std::uint64_t> keys,
                                  std::span<const GlobalId> weights) {
   check(weights.empty() || weights.size() == keys.size(), "one weight an item");
-  const std::vector<std::uint64_t> cuts = find_cuts(comm, sort_items(keys, weights));
-  std::vector<int> ranks(keys.size());
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    ranks[i] = static_cast<int>(std::upper_bound(cuts.begin(), cuts.end(), keys[i]) - cuts.begin());
-  }
-  return ranks;
+  const SortedItems items = sort_items(keys, weights);
+  return cut_at(keys, find_cuts(comm, items, equal_bounds(comm.sum(items.weight_before.back()), comm.size())));
+}
+
+std::vector<int> curve_partition(const Communicator& comm, std::span<const std::uint64_t> keys,
+                                 std::span<const GlobalId> weights, std::span<const Real> shares) {
+  check(weights.empty() || weights.size() == keys.size(), "one weight an item");
+  const SortedItems items = sort_items(keys, weights);
+  return cut_at(keys, find_cuts(comm, items, bounds_of_shares(comm.sum(items.weight_before.back()), shares)));
 }
 
 }  // namespace malleus

@@ -17,4 +17,8 @@ namespace malleus {
 std::vector<int> curve_partition(const Communicator& comm, std::span<const std::uint64_t> keys,
                                  std::span<const GlobalId> weights);
 
+/// The same for any number of parts in proportion to their shares (>= 0, not all 0): the part of each item. Collective.
+std::vector<int> curve_partition(const Communicator& comm, std::span<const std::uint64_t> keys,
+                                 std::span<const GlobalId> weights, std::span<const Real> shares);
+
 }  // namespace malleus

@@ -17,6 +17,8 @@ MPI_Datatype mpi_type() {
     return MPI_DOUBLE;
   } else if constexpr (std::is_same_v<T, float>) {
     return MPI_FLOAT;
+  } else if constexpr (std::is_same_v<T, std::int32_t>) {
+    return MPI_INT32_T;
   } else {
     return MPI_INT64_T;
   }
@@ -136,6 +138,9 @@ void Halo::update_copies(std::span<float> values, int components) const {
   update(values, components);
 }
 void Halo::update_copies(std::span<GlobalId> values, int components) const {
+  update(values, components);
+}
+void Halo::update_copies(std::span<std::int32_t> values, int components) const {
   update(values, components);
 }
 

@@ -2,6 +2,7 @@
 
 /// Owner <-> copy exchange of values on entities that several ranks hold.
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -39,6 +40,7 @@ class Halo {
   void update_copies(std::span<Real> values, int components) const;
   void update_copies(std::span<float> values, int components) const;
   void update_copies(std::span<GlobalId> values, int components) const;
+  void update_copies(std::span<std::int32_t> values, int components) const;
   /// Values of the copies are added to their owner's; the copies keep theirs. In rank order, so the sums repeat
   /// bit for bit. Collective among neighbours.
   void add_to_owners(std::span<Real> values, int components) const;

@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -60,20 +61,79 @@ struct PartArrays {
   }
 };
 
-PartArrays arrays_of(const Mesh& mesh, const FieldStore& fields) {
-  PartArrays part;
-  part.points = mesh.coordinates;
-  for (LocalId node = 0; node < mesh.nodes(); ++node) part.node_numbers.push_back(mesh.global_node(node));
-  part.cells = mesh.element_nodes;
-  part.region = mesh.element_region;
-  part.element_ids = mesh.element_ids;
+/// The entities of one part of this rank's mesh, by local index, increasing.
+struct PartEntities {
+  std::vector<LocalId> elements;
+  std::vector<LocalId> nodes;
+  std::vector<LocalId> facets;  ///< those with a group
+};
+
+/// The entities of the parts [first, last) of this rank. parts: [element].
+std::vector<PartEntities> entities_of_parts(const Mesh& mesh, std::span<const int> parts, int first, int last) {
+  std::vector<PartEntities> entities(static_cast<std::size_t>(last - first));
+  const auto of = [&](LocalId element) -> PartEntities& {
+    const int part = parts[static_cast<std::size_t>(element)];
+    check(part >= first && part < last, "a part lies on the rank that writes it");
+    return entities[static_cast<std::size_t>(part - first)];
+  };
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    PartEntities& part = of(e);
+    part.elements.push_back(e);
+    const auto nodes = mesh.nodes_of_element(e);
+    part.nodes.insert(part.nodes.end(), nodes.begin(), nodes.end());
+  }
   for (LocalId f = 0; f < mesh.facets(); ++f) {
     if (mesh.facet_group[static_cast<std::size_t>(f)] < 0) continue;
-    const auto nodes = mesh.nodes_of_facet(f);
-    part.facets.insert(part.facets.end(), nodes.begin(), nodes.end());
+    of(mesh.facet_element[static_cast<std::size_t>(f)]).facets.push_back(f);
+  }
+  for (PartEntities& part : entities) {
+    std::sort(part.nodes.begin(), part.nodes.end());
+    part.nodes.erase(std::unique(part.nodes.begin(), part.nodes.end()), part.nodes.end());
+  }
+  return entities;
+}
+
+/// Places of mesh nodes in a part's list.
+std::vector<std::int32_t> places_in(std::span<const LocalId> list, std::span<const LocalId> nodes) {
+  std::vector<std::int32_t> places;
+  for (const LocalId node : nodes) {
+    places.push_back(static_cast<std::int32_t>(std::lower_bound(list.begin(), list.end(), node) - list.begin()));
+  }
+  return places;
+}
+
+std::vector<double> values_of(const Field& field, const PartEntities& part) {
+  const auto values = field.values();
+  if (field.spec().support == Support::domain) return {values.begin(), values.end()};
+  const std::vector<LocalId>& entities = field.spec().support == Support::node ? part.nodes : part.elements;
+  std::vector<double> rows;
+  for (const LocalId entity : entities)
+    rows.insert(rows.end(), field.at(entity), field.at(entity) + field.components());
+  return rows;
+}
+
+template <class T>
+void append_place(std::vector<std::int32_t>& target, std::span<const LocalId> list, const T& nodes) {
+  const std::vector<std::int32_t> places = places_in(list, nodes);
+  target.insert(target.end(), places.begin(), places.end());
+}
+
+PartArrays arrays_of(const Mesh& mesh, const FieldStore& fields, const PartEntities& entities) {
+  PartArrays part;
+  for (const LocalId node : entities.nodes) {
+    part.points.insert(part.points.end(), mesh.point(node), mesh.point(node) + mesh.dim);
+    part.node_numbers.push_back(mesh.global_node(node));
+  }
+  for (const LocalId e : entities.elements) {
+    append_place(part.cells, entities.nodes, mesh.nodes_of_element(e));
+    part.region.push_back(mesh.element_region[static_cast<std::size_t>(e)]);
+    if (!mesh.element_ids.empty()) part.element_ids.push_back(mesh.element_ids[static_cast<std::size_t>(e)]);
+  }
+  for (const LocalId f : entities.facets) {
+    append_place(part.facets, entities.nodes, mesh.nodes_of_facet(f));
     part.facet_group.push_back(mesh.facet_group[static_cast<std::size_t>(f)]);
   }
-  for (const Field* field : fields.all()) part.fields.emplace_back(field->values().begin(), field->values().end());
+  for (const Field* field : fields.all()) part.fields.push_back(values_of(*field, entities));
   return part;
 }
 
@@ -81,6 +141,27 @@ PartArrays arrays_of(const Mesh& mesh, const FieldStore& fields) {
 struct PartSizes {
   GlobalId nodes, elements, ids, facets, checksum;
 };
+
+/// The sizes of all parts on all ranks; `arrays` are those of the parts from `first` on. Collective.
+std::vector<PartSizes> gather_sizes(const Communicator& comm, const std::vector<PartArrays>& arrays, int first,
+                                    int n_parts) {
+  constexpr std::size_t entries = 5;
+  std::vector<GlobalId> table(static_cast<std::size_t>(n_parts) * entries, 0);
+  for (std::size_t i = 0; i < arrays.size(); ++i) {
+    const PartArrays& part = arrays[i];
+    const std::array<GlobalId, entries> row = {static_cast<GlobalId>(part.node_numbers.size()),
+                                               static_cast<GlobalId>(part.region.size()),
+                                               static_cast<GlobalId>(part.element_ids.size()),
+                                               static_cast<GlobalId>(part.facet_group.size()), part.checksum()};
+    std::copy(row.begin(), row.end(), table.begin() + static_cast<std::ptrdiff_t>((first + i) * entries));
+  }
+  comm.sum_in_place(std::span<GlobalId>(table));
+  std::vector<PartSizes> sizes;
+  for (std::size_t i = 0; i < table.size(); i += entries) {
+    sizes.push_back({table[i], table[i + 1], table[i + 2], table[i + 3], table[i + 4]});
+  }
+  return sizes;
+}
 
 void make_part(SharedH5File& file, GlobalId part, const PartSizes& sizes, int dim, const FieldStore& fields) {
   using Type = SharedH5File::Type;
@@ -204,6 +285,22 @@ FieldedPiece read_part(const H5File& file, const fs::path& path, const nlohmann:
   return loose;
 }
 
+/// Elements without a place in an earlier file get their place in this one. Collective.
+void number_elements(const Communicator& comm, std::vector<FieldedPiece>& pieces) {
+  GlobalId mine = 0;
+  GlobalId numbered = 0;
+  for (const FieldedPiece& part : pieces) {
+    mine += part.piece.elements();
+    numbered += static_cast<GlobalId>(part.piece.element_ids.size());
+  }
+  GlobalId next = comm.sum_of_lower_ranks(mine);
+  if (comm.sum(numbered) > 0) return;
+  for (FieldedPiece& part : pieces) {
+    part.piece.element_ids.resize(part.piece.element_region.size());
+    for (GlobalId& id : part.piece.element_ids) id = next++;
+  }
+}
+
 /// The description, read once and known to all ranks.
 nlohmann::json shared_head(const Communicator& comm, const fs::path& path) {
   std::string text;
@@ -227,11 +324,12 @@ std::vector<FieldedPiece> read_my_parts(const Communicator& comm, const fs::path
   names.piece.region_names = head.at("region_names").get<std::vector<std::string>>();
   names.piece.group_names = head.at("group_names").get<std::vector<std::string>>();
   std::vector<FieldedPiece> pieces = {std::move(names)};
-  const GlobalId parts = head.at("parts");
+  const int parts = head.at("parts");
   agree(comm, [&] {
     try {
       const H5File file(path, H5File::Mode::read);
-      for (GlobalId p = parts * comm.rank() / comm.size(); p < parts * (comm.rank() + 1) / comm.size(); ++p) {
+      for (int p = first_part_of_rank(parts, comm.rank(), comm.size());
+           p < first_part_of_rank(parts, comm.rank() + 1, comm.size()); ++p) {
         pieces.push_back(read_part(file, path, head, p, length_unit));
       }
     } catch (const StorageError& error) {
@@ -244,18 +342,20 @@ std::vector<FieldedPiece> read_my_parts(const Communicator& comm, const fs::path
 }  // namespace
 
 void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh& mesh, const FieldStore& fields) {
-  const PartArrays arrays = arrays_of(mesh, fields);
-  std::vector<PartSizes> sizes(static_cast<std::size_t>(comm.size()));
-  const auto gather = [&](GlobalId mine, GlobalId PartSizes::*member) {
-    const std::vector<GlobalId> all = comm.gather_to_all(mine);
-    for (std::size_t p = 0; p < all.size(); ++p) sizes[p].*member = all[p];
-  };
-  gather(mesh.nodes(), &PartSizes::nodes);
-  gather(mesh.elements(), &PartSizes::elements);
-  gather(static_cast<GlobalId>(mesh.element_ids.size()), &PartSizes::ids);
-  gather(static_cast<GlobalId>(arrays.facet_group.size()), &PartSizes::facets);
-  gather(arrays.checksum(), &PartSizes::checksum);
-  nlohmann::json head = describe(mesh, fields, comm.size());
+  const std::vector<int> parts(static_cast<std::size_t>(mesh.elements()), comm.rank());
+  write_mesh_file(comm, path, mesh, fields, parts, comm.size());
+}
+
+void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh& mesh, const FieldStore& fields,
+                     std::span<const int> parts, int n_parts) {
+  const int first = first_part_of_rank(n_parts, comm.rank(), comm.size());
+  const int last = first_part_of_rank(n_parts, comm.rank() + 1, comm.size());
+  std::vector<PartArrays> arrays;
+  for (const PartEntities& part : entities_of_parts(mesh, parts, first, last)) {
+    arrays.push_back(arrays_of(mesh, fields, part));
+  }
+  const std::vector<PartSizes> sizes = gather_sizes(comm, arrays, first, n_parts);
+  nlohmann::json head = describe(mesh, fields, n_parts);
   for (const PartSizes& part : sizes) head["checksums"].push_back(part.checksum);
 
   fs::path aside = path;
@@ -271,7 +371,7 @@ void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh&
   const std::string text = head.dump();
   file.make_dataset("/malleus_mesh", SharedH5File::Type::int32, {text.size()});
   agree(comm, [&] {
-    write_part(file, comm.rank(), arrays, fields);
+    for (int p = first; p < last; ++p) write_part(file, p, arrays[static_cast<std::size_t>(p - first)], fields);
     const std::vector<std::int32_t> letters(text.begin(), text.end());
     if (comm.is_root()) file.write("/malleus_mesh", letters);
   });
@@ -285,9 +385,14 @@ void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh&
   });
 }
 
+int first_part_of_rank(int n_parts, int rank, int ranks) {
+  return static_cast<int>(static_cast<GlobalId>(n_parts) * rank / ranks);
+}
+
 Mesh read_mesh_file(const Communicator& comm, const fs::path& path, Real length_unit, FieldStore& fields) {
   const nlohmann::json head = shared_head(comm, path);
-  const std::vector<FieldedPiece> pieces = read_my_parts(comm, path, head, length_unit);
+  std::vector<FieldedPiece> pieces = read_my_parts(comm, path, head, length_unit);
+  number_elements(comm, pieces);
   const Mesh nothing;
   for (const FieldSpec& spec : field_specs(head.at("fields"))) fields.declare(nothing, spec);
   return assemble_with_fields(comm, merge_pieces(pieces), fields);

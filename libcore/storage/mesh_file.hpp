@@ -15,8 +15,17 @@ namespace malleus {
 void write_mesh_file(const Communicator& comm, const std::filesystem::path& path, const Mesh& mesh,
                      const FieldStore& fields);
 
+/// The same with any number of partitions: parts [element] in [0, n_parts). This rank writes, and its mesh holds
+/// elements of, the parts from first_part_of_rank(n_parts, rank, ranks) to that of the next rank. Collective.
+void write_mesh_file(const Communicator& comm, const std::filesystem::path& path, const Mesh& mesh,
+                     const FieldStore& fields, std::span<const int> parts, int n_parts);
+
+/// Where parts are dealt to ranks in stretches. Local.
+int first_part_of_rank(int n_parts, int rank, int ranks);
+
 /// A mesh file as read: partitions dealt to the ranks in stretches, so that on as many ranks as wrote it each gets
-/// its own; on others ranks may be empty or unequal. Fields come declared in the store.
+/// its own; on others ranks may be empty or unequal. Fields come declared in the store. Elements of a file without
+/// element places are given their place in it.
 /// length_unit: m per unit of the file. InputError where the file is damaged or no mesh file of ours. Collective.
 Mesh read_mesh_file(const Communicator& comm, const std::filesystem::path& path, Real length_unit, FieldStore& fields);
 

@@ -1,0 +1,30 @@
+#pragma once
+
+/// Bands of vertices on their way to the rank that solves a pair's problem, and the answers.
+
+#include <vector>
+
+#include "parallel/byte_stream.hpp"
+#include "partition/pair_problem.hpp"
+
+namespace malleus {
+
+/// Vertices of one pair's band, as one rank sends them, with all edges inside the band by vertex numbers.
+struct BandPiece {
+  std::vector<GlobalId> numbers;
+  std::vector<Real> weights;
+  std::vector<signed char> sides;
+  std::vector<std::array<Real, 2>> outside;
+  std::vector<Real> third;
+  std::vector<std::int32_t> degrees;  ///< [vertex] edges inside the band
+  std::vector<GlobalId> neighbours;
+  std::vector<std::int32_t> edge_weights;
+
+  void put(ByteWriter& writer) const;
+  static BandPiece get(ByteReader& reader);
+};
+
+/// The problem of a band whose pieces came from several ranks; numbers: of its vertices, in order.
+PairProblem join_band(const std::vector<const BandPiece*>& pieces, std::vector<GlobalId>& numbers);
+
+}  // namespace malleus

@@ -1,0 +1,253 @@
+#include "partition/partition.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+
+#include "base/error.hpp"
+#include "mesh/curve_partition.hpp"
+#include "mesh/space_filling_curve.hpp"
+#include "partition/bisect.hpp"
+#include "partition/multilevel.hpp"
+#include "partition/relabel.hpp"
+
+namespace malleus {
+namespace {
+
+/// Above this imbalance of the present partition a new one is made as well, and the better of the two taken: flows
+/// then move whole parts, and the borders that they leave are long.
+constexpr Real start_anew_from = 0.5;
+constexpr int levelling_rounds = 6;
+
+/// Wall time by phase; the largest over the ranks is asked for at the end.
+class PhaseClock {
+ public:
+  void end(const std::string& phase) {
+    const auto now = std::chrono::steady_clock::now();
+    seconds_[phase] += std::chrono::duration<Real>(now - start_).count();
+    start_ = now;
+  }
+  std::map<std::string, Real> largest(const Communicator& comm) const {
+    std::map<std::string, Real> seconds;
+    for (const auto& [phase, mine] : seconds_) seconds[phase] = comm.max(mine);
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::map<std::string, Real> seconds_;
+};
+
+/// A partition on its way, with its name and cost.
+struct Candidate {
+  std::vector<int> parts;  ///< [owned vertex]
+  std::string made_by;
+  PartitionCost cost;
+  Real moved = 0;
+};
+
+class Planner {
+ public:
+  Planner(const Communicator& comm, const Mesh& mesh, const WorkModel& model, const Architecture& architecture,
+          const PartitionOptions& options)
+      : comm_(comm),
+        mesh_(mesh),
+        model_(model),
+        architecture_(architecture),
+        options_(options),
+        graph_(build_work_graph(comm, mesh, element_work(comm, mesh, model))) {
+    const Real total = comm.sum(std::accumulate(graph_.weights.begin(), graph_.weights.end(), Real{0}));
+    for (const Real speed : architecture.speed) targets_.push_back(total * speed / architecture.total_speed());
+    clock_.end("graph");
+  }
+
+  PartitionPlan run(std::span<const int> from, bool has_start) {
+    PartitionPlan plan;
+    Candidate best;
+    if (!has_start) {
+      best = options_.method == Partitioner::curve ? along_curve() : anew();
+      plan.before = best.cost;
+    } else {
+      const Candidate present = {{from.begin(), from.end()}, "as it was", cost_of(from), 0};
+      plan.before = present.cost;
+      best = repaired(present);
+      if (best.cost.cost >= present.cost.cost) best = present;
+    }
+    plan.parts = std::move(best.parts);
+    plan.after = std::move(best.cost);
+    plan.made_by = std::move(best.made_by);
+    plan.moved = best.moved;
+    if (has_start) plan.moved_elements = count_moved(from, plan.parts);
+    plan.seconds = clock_.largest(comm_);
+    return plan;
+  }
+
+ private:
+  PartitionCost cost_of(std::span<const int> parts) {
+    clock_.end("divide");
+    PartitionCost cost = partition_cost(comm_, mesh_, graph_, model_, architecture_, parts);
+    clock_.end("evaluate");
+    return cost;
+  }
+
+  std::vector<int> curve_parts() const {
+    const Box box = bounding_box(comm_, mesh_.coordinates, mesh_.dim);
+    std::vector<std::uint64_t> keys(graph_.weights.size());
+    std::vector<GlobalId> weights(graph_.weights.size());
+    for (std::size_t e = 0; e < keys.size(); ++e) {
+      keys[e] = hilbert_key(graph_.centres.data() + e * static_cast<std::size_t>(graph_.dim), graph_.dim, box);
+      weights[e] = static_cast<GlobalId>(graph_.weights[e]);
+    }
+    return curve_partition(comm_, keys, weights, architecture_.speed);
+  }
+
+  Candidate along_curve() {
+    Candidate candidate = {curve_parts(), "curve", {}, 0};
+    candidate.cost = cost_of(candidate.parts);
+    return candidate;
+  }
+
+  /// Edges of the graph between parts, divided by the bandwidths of their links.
+  Real raw_cut(std::vector<int> parts) const {
+    parts.resize(static_cast<std::size_t>(graph_.vertices()));
+    graph_.halo.update_copies(std::span<std::int32_t>(parts), 1);
+    Real cut = 0;
+    for (LocalId v = 0; v < graph_.owned(); ++v) {
+      const int part = parts[static_cast<std::size_t>(v)];
+      for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
+        const int other = parts[static_cast<std::size_t>(graph_.neighbours[j])];
+        if (other != part) cut += graph_.edge_weights[j] * architecture_.inverse_link(part, other);
+      }
+    }
+    return comm_.sum(cut);
+  }
+
+  std::vector<int> refine(std::vector<int> parts) {
+    MultilevelSettings settings;
+    settings.tolerance = options_.tolerance;
+    return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, settings);
+  }
+
+  /// The start of least cut, refined.
+  Candidate anew() {
+    std::vector<Candidate> starts;
+    starts.push_back({curve_parts(), "curve", {}, 0});
+    starts.push_back(
+        {bisect(comm_, graph_, architecture_.speed, BisectionAxis::coordinate), "coordinate bisection", {}, 0});
+    starts.push_back(
+        {bisect(comm_, graph_, architecture_.speed, BisectionAxis::inertial), "inertial bisection", {}, 0});
+    std::size_t best = 0;
+    Real least = 0;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      const Real cut = raw_cut(starts[i].parts);
+      if (i > 0 && cut >= least) continue;
+      least = cut;
+      best = i;
+    }
+    clock_.end("start");
+    Candidate candidate = std::move(starts[best]);
+    candidate.parts = refine(std::move(candidate.parts));
+    candidate.made_by += " and refinement";
+    candidate.cost = cost_of(candidate.parts);
+    return levelled(std::move(candidate));
+  }
+
+  /// From the present partition by flows, or anew where that is predicted to be cheaper.
+  Candidate repaired(const Candidate& present) {
+    Candidate best = {refine(present.parts), "flows and refinement", {}, 0};
+    best.cost = cost_of(best.parts);
+    finish(present, best);
+    if (present.cost.imbalance > start_anew_from) {
+      Candidate other = anew();
+      finish(present, other);
+      if (predicted(other) < predicted(best)) best = std::move(other);
+    }
+    return best;
+  }
+
+  Real predicted(const Candidate& candidate) const {
+    return candidate.cost.cost + options_.moving_cost * candidate.moved;
+  }
+
+  void finish(const Candidate& present, Candidate& candidate) {
+    relabel_parts(comm_, graph_, architecture_, present.parts, candidate.parts);
+    candidate.cost = cost_of(candidate.parts);
+    candidate = levelled(std::move(candidate));
+    candidate.moved = moved_work(present.parts, candidate.parts);
+  }
+
+  /// Where links or speeds differ: moves the targets until t_p + C_p is level over the parts, and keeps the best.
+  Candidate levelled(Candidate best) {
+    if (architecture_.has_equal_links() && architecture_.has_equal_speeds()) return best;
+    const Real total = std::accumulate(targets_.begin(), targets_.end(), Real{0});
+    std::vector<Real> targets = targets_;
+    Candidate current = best;
+    for (int round = 0; round < levelling_rounds; ++round) {
+      move_targets(current.cost, targets, total);
+      std::vector<int> parts = current.parts;
+      parts.resize(static_cast<std::size_t>(graph_.vertices()));
+      graph_.halo.update_copies(std::span<std::int32_t>(parts), 1);
+      PairRefiner refiner(comm_, graph_, architecture_, std::move(parts), targets);
+      refiner.diffuse(0.003, 6);
+      refiner.smooth(0.004, {2, 3, 1, 100});
+      if (refiner.absorb_pieces() > 0) refiner.diffuse(0.003, 2);
+      current.parts = std::move(refiner).take_parts();
+      current.parts.resize(static_cast<std::size_t>(graph_.owned()));
+      current.cost = cost_of(current.parts);
+      if (current.cost.cost < best.cost.cost) best = current;
+    }
+    return best;
+  }
+
+  void move_targets(const PartitionCost& cost, std::vector<Real>& targets, Real total) const {
+    constexpr Real damping = 0.8;
+    constexpr Real least = 0.05;
+    const Real speeds = architecture_.total_speed();
+    Real level = 0;
+    for (std::size_t p = 0; p < targets.size(); ++p) level += architecture_.speed[p] * cost.times[p] / speeds;
+    Real sum = 0;
+    for (std::size_t p = 0; p < targets.size(); ++p) {
+      const Real change = damping * (level - cost.times[p]) * architecture_.speed[p] * total / speeds;
+      targets[p] = std::max(least * targets_[p], targets[p] + change);
+      sum += targets[p];
+    }
+    for (Real& target : targets) target *= total / sum;
+  }
+
+  Real moved_work(std::span<const int> from, std::span<const int> to) const {
+    Real moved = 0;
+    Real total = 0;
+    for (std::size_t v = 0; v < to.size(); ++v) {
+      total += graph_.weights[v];
+      if (from[v] != to[v]) moved += graph_.weights[v];
+    }
+    return comm_.sum(moved) / comm_.sum(total);
+  }
+
+  GlobalId count_moved(std::span<const int> from, std::span<const int> to) const {
+    GlobalId moved = 0;
+    for (std::size_t v = 0; v < to.size(); ++v) moved += from[v] != to[v] ? 1 : 0;
+    return comm_.sum(moved);
+  }
+
+  const Communicator& comm_;
+  const Mesh& mesh_;
+  const WorkModel& model_;
+  const Architecture& architecture_;
+  const PartitionOptions& options_;
+  PhaseClock clock_;
+  WorkGraph graph_;
+  std::vector<Real> targets_;
+};
+
+}  // namespace
+
+PartitionPlan make_partition(const Communicator& comm, const Mesh& mesh, const WorkModel& model,
+                             const Architecture& architecture, const PartitionOptions& options,
+                             std::span<const int> from) {
+  const bool has_start = comm.any(!from.empty());
+  check(!has_start || from.size() == static_cast<std::size_t>(mesh.elements()), "each element has a present part");
+  return Planner(comm, mesh, model, architecture, options).run(from, has_start);
+}
+
+}  // namespace malleus

@@ -1,0 +1,45 @@
+#pragma once
+
+/// Division of a mesh among processors, and its repair in place: MeshMigration for unequal machines (paper, 3.1).
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "partition/partition_cost.hpp"
+
+namespace malleus {
+
+enum class Partitioner {
+  refined,  ///< the best geometric start, refined; from a given partition what costs least, diffusion or anew
+  curve,    ///< stretches of the space-filling curve, as they come
+};
+
+struct PartitionOptions {
+  Partitioner method = Partitioner::refined;
+  Real tolerance = 0.01;  ///< imbalance of the work aimed at
+  /// Cost of moving everything once, in increments, over the increments until the next repair: by it a plan that moves
+  /// less is preferred to one that costs less per increment.
+  Real moving_cost = 0.05;
+};
+
+/// A partition as a value: it can be looked at, written, compared and refused before anything is moved.
+struct PartitionPlan {
+  std::vector<int> parts;  ///< [element] of this rank
+  PartitionCost before;    ///< of the given partition; where none was given, as after
+  PartitionCost after;
+  Real moved = 0;                       ///< share of the work that changes part; 0 where no partition was given
+  GlobalId moved_elements = 0;          ///< over all ranks
+  std::string made_by;                  ///< what was chosen, in words
+  std::map<std::string, Real> seconds;  ///< wall time by phase, largest over the ranks
+};
+
+/// Divides the elements of a mesh among the parts of an architecture, on any number of ranks; the mesh stays where it
+/// is. from: [element] the present part in [0, parts), or empty on all ranks where there is none. The same mesh on the
+/// same ranks gives the same plan. Collective.
+PartitionPlan make_partition(const Communicator& comm, const Mesh& mesh, const WorkModel& model,
+                             const Architecture& architecture, const PartitionOptions& options,
+                             std::span<const int> from = {});
+
+}  // namespace malleus
