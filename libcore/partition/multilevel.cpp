@@ -3,11 +3,16 @@
 #include <algorithm>
 #include <numeric>
 
+#include "parallel/gather.hpp"
 #include "partition/coarsen.hpp"
+#include "partition/replicate.hpp"
 
 namespace malleus {
 namespace {
 
+/// A graph of at most this many vertices, and so many a part, is refined by each rank for itself, all alike: rounds of
+/// pairs on small graphs are waiting more than work.
+constexpr GlobalId few_vertices = 60000;
 constexpr std::size_t most_levels = 30;
 constexpr Real least_shrinking = 0.95;
 
@@ -17,13 +22,13 @@ std::vector<int> with_copies(const WorkGraph& graph, std::vector<int> parts) {
   return parts;
 }
 
-/// Coarser graphs of the given one, and the parts of the coarsest's owned vertices.
+/// Coarser graphs of the given one, to about `enough` vertices; parts become those of the coarsest's owned vertices.
 std::vector<CoarseGraph> make_levels(const Communicator& comm, const WorkGraph& finest, std::vector<int>& parts,
-                                     const std::vector<Real>& targets, const MultilevelSettings& settings) {
+                                     const std::vector<Real>& targets, GlobalId enough,
+                                     const MultilevelSettings& settings) {
   const Real total = std::accumulate(targets.begin(), targets.end(), Real{0});
   const auto n_parts = static_cast<GlobalId>(targets.size());
   const Real heaviest = std::max(1.0, total / (1.5 * settings.vertices_per_part * static_cast<Real>(n_parts)));
-  const GlobalId enough = std::max<GlobalId>(1000, settings.vertices_per_part * n_parts);
   std::vector<CoarseGraph> levels;
   const WorkGraph* graph = &finest;
   levels.reserve(most_levels);
@@ -63,26 +68,23 @@ std::vector<int> refine_level(const Communicator& comm, const WorkGraph& graph, 
   return parts;
 }
 
-}  // namespace
-
-std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                                   std::vector<int> parts, const std::vector<Real>& targets,
+/// The same on every rank by itself, for graphs of few vertices.
+std::vector<int> refine_replicated(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                                   const std::vector<int>& parts, const std::vector<Real>& targets,
                                    const MultilevelSettings& settings) {
-  const std::vector<CoarseGraph> levels = make_levels(comm, graph, parts, targets, settings);
-  const Real smallest = *std::min_element(targets.begin(), targets.end());
-  for (std::size_t level = levels.size(); level > 0; --level) {
-    const WorkGraph& coarse = levels[level - 1].graph;
-    const Real grain = smallest > 0 ? heaviest_vertex(comm, coarse) / smallest : 0;
-    const Real tolerance = std::clamp(1.5 * grain, settings.tolerance, std::max(settings.tolerance, 0.03));
-    parts = refine_level(comm, coarse, architecture, std::move(parts), targets, tolerance, level == levels.size(),
-                         {settings.coarse_passes, 3, 2, 200});
-    const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
-    std::vector<int> finer(coarse_of.size());
-    for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
-    parts = std::move(finer);
-  }
+  const Communicator alone(MPI_COMM_SELF);
+  const WorkGraph whole = replicate_graph(comm, alone, graph);
+  const std::vector<int> refined =
+      refine_multilevel(alone, whole, architecture, gather_lists<int>(comm, parts), targets, settings);
+  const auto first = refined.begin() + graph.ownership.begin();
+  return {first, first + graph.owned()};
+}
+
+std::vector<int> refine_finest(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                               std::vector<int> parts, const std::vector<Real>& targets, int rounds,
+                               const MultilevelSettings& settings) {
   PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
-  refiner.diffuse(0.9 * settings.tolerance, levels.empty() ? 30 : 6);
+  refiner.diffuse(0.9 * settings.tolerance, rounds);
   refiner.smooth(settings.tolerance, {settings.fine_passes, 3, 2, 300});
   for (int sweep = 0; sweep < 3 && refiner.absorb_pieces() > 0; ++sweep) {
     refiner.diffuse(settings.tolerance, 4);
@@ -91,6 +93,38 @@ std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& gr
   parts = std::move(refiner).take_parts();
   parts.resize(static_cast<std::size_t>(graph.owned()));
   return parts;
+}
+
+}  // namespace
+
+std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                                   std::vector<int> parts, const std::vector<Real>& targets,
+                                   const MultilevelSettings& settings) {
+  const GlobalId few = few_vertices + settings.vertices_per_part * static_cast<GlobalId>(targets.size());
+  if (comm.size() > 1 && graph.ownership.total() <= few) {
+    return refine_replicated(comm, graph, architecture, parts, targets, settings);
+  }
+  const GlobalId enough = comm.size() > 1 ? few : settings.vertices_per_part * static_cast<GlobalId>(targets.size());
+  const std::vector<CoarseGraph> levels = make_levels(comm, graph, parts, targets, enough, settings);
+  const Real smallest = *std::min_element(targets.begin(), targets.end());
+  for (std::size_t level = levels.size(); level > 0; --level) {
+    const WorkGraph& coarse = levels[level - 1].graph;
+    const bool is_coarsest = level == levels.size();
+    const Real grain = smallest > 0 ? heaviest_vertex(comm, coarse) / smallest : 0;
+    MultilevelSettings here = settings;
+    here.tolerance = std::clamp(1.5 * grain, settings.tolerance, std::max(settings.tolerance, 0.03));
+    if (is_coarsest && comm.size() > 1 && coarse.ownership.total() <= few) {
+      parts = refine_replicated(comm, coarse, architecture, parts, targets, here);
+    } else {
+      parts = refine_level(comm, coarse, architecture, std::move(parts), targets, here.tolerance, is_coarsest,
+                           {settings.coarse_passes, 3, 2, 200});
+    }
+    const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
+    std::vector<int> finer(coarse_of.size());
+    for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
+    parts = std::move(finer);
+  }
+  return refine_finest(comm, graph, architecture, std::move(parts), targets, levels.empty() ? 30 : 6, settings);
 }
 
 }  // namespace malleus

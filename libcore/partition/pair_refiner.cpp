@@ -20,6 +20,7 @@ PairRefiner::PairRefiner(const Communicator& comm, const WorkGraph& graph, const
   mark_.assign(parts_.size(), 0);
   handed_.assign(comm.size() > 1 ? parts_.size() : 0, 0);
   find_candidates();
+  list_copy_neighbours();
 }
 
 Real PairRefiner::imbalance() const {
@@ -39,75 +40,128 @@ bool PairRefiner::touches(LocalId vertex, int part) const {
 
 void PairRefiner::find_candidates() {
   is_candidate_.assign(static_cast<std::size_t>(graph_.owned()), 0);
-  is_at_copies_.assign(is_candidate_.size(), 0);
+  is_recent_.assign(is_candidate_.size(), 0);
   for (LocalId v = 0; v < graph_.owned(); ++v) {
-    bool is_border = false;
     for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
-      const LocalId other = graph_.neighbours[j];
-      is_border = is_border || part_of(other) != part_of(v);
-      if (other >= graph_.owned()) is_at_copies_[static_cast<std::size_t>(v)] = 1;
+      if (part_of(graph_.neighbours[j]) == part_of(v)) continue;
+      is_candidate_[static_cast<std::size_t>(v)] = 1;
+      candidates_.push_back(v);
+      break;
     }
-    if (!is_border && is_at_copies_[static_cast<std::size_t>(v)] == 0) continue;
-    is_candidate_[static_cast<std::size_t>(v)] = 1;
-    candidates_.push_back(v);
   }
 }
 
-void PairRefiner::note_changes(std::span<const LocalId> changed) {
-  const auto add = [&](LocalId v) {
-    if (v >= graph_.owned() || is_candidate_[static_cast<std::size_t>(v)] != 0) return;
-    is_candidate_[static_cast<std::size_t>(v)] = 1;
-    candidates_.push_back(v);
+void PairRefiner::list_copy_neighbours() {
+  copy_start_.assign(graph_.copy_numbers.size() + 1, 0);
+  const auto for_each_copy = [&](auto visit) {
+    for (LocalId v = 0; v < graph_.owned(); ++v) {
+      for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
+        if (graph_.neighbours[j] >= graph_.owned()) {
+          visit(static_cast<std::size_t>(graph_.neighbours[j] - graph_.owned()), v);
+        }
+      }
+    }
   };
-  for (const LocalId v : changed) {
-    add(v);
-    for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) add(graph_.neighbours[j]);
+  for_each_copy([&](std::size_t copy, LocalId) { ++copy_start_[copy + 1]; });
+  std::partial_sum(copy_start_.begin(), copy_start_.end(), copy_start_.begin());
+  copy_neighbours_.resize(static_cast<std::size_t>(copy_start_.back()));
+  std::vector<std::int64_t> next(copy_start_.begin(), copy_start_.end() - 1);
+  for_each_copy([&](std::size_t copy, LocalId v) { copy_neighbours_[static_cast<std::size_t>(next[copy]++)] = v; });
+}
+
+/// The vertex, which may be a copy, has changed part: it and its neighbours may be at other borders now.
+void PairRefiner::note_change(LocalId vertex) {
+  const auto add = [&](LocalId v) {
+    if (v >= graph_.owned()) return;
+    if (char& is_known = is_candidate_[static_cast<std::size_t>(v)]; is_known == 0) {
+      is_known = 1;
+      candidates_.push_back(v);
+    }
+    if (char& is_known = is_recent_[static_cast<std::size_t>(v)]; is_known == 0) {
+      is_known = 1;
+      recent_.push_back(v);
+    }
+  };
+  if (vertex < graph_.owned()) {
+    add(vertex);
+    for (std::size_t j = graph_.first(vertex); j < graph_.last(vertex); ++j) add(graph_.neighbours[j]);
+    return;
+  }
+  const auto copy = static_cast<std::size_t>(vertex - graph_.owned());
+  for (auto j = copy_start_[copy]; j < copy_start_[copy + 1]; ++j) add(copy_neighbours_[static_cast<std::size_t>(j)]);
+}
+
+void PairRefiner::update_copies_of_parts() {
+  if (comm_.size() == 1) return;
+  const std::vector<int> before(parts_.begin() + graph_.owned(), parts_.end());
+  graph_.halo.update_copies(std::span<std::int32_t>(parts_), 1);
+  for (std::size_t copy = 0; copy < before.size(); ++copy) {
+    const LocalId vertex = graph_.owned() + static_cast<LocalId>(copy);
+    if (part_of(vertex) != before[copy]) note_change(vertex);
   }
 }
 
-std::vector<QuotientEdge> PairRefiner::quotient() {
-  std::vector<QuotientEdge> edges;
+/// The borders as this rank sees them, and the vertices at each.
+std::vector<QuotientEdge> PairRefiner::local_quotient() {
+  struct Border {
+    QuotientEdge edge;
+    std::vector<LocalId> vertices;
+  };
+  std::vector<std::vector<Border>> by_lower_part(targets_.size());
+  const auto find = [&](int p, int q) -> Border& {
+    std::vector<Border>& borders = by_lower_part[static_cast<std::size_t>(p)];
+    for (Border& border : borders) {
+      if (border.edge.q == q) return border;
+    }
+    return borders.emplace_back(Border{{p, q, 0, {0, 0}}, {}});
+  };
   std::vector<LocalId> still;
-  std::vector<int> seen;  // parts across, of the present vertex
   for (const LocalId v : candidates_) {
     const int part = part_of(v);
-    seen.clear();
+    bool is_border = false;
     for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
       const int other = part_of(graph_.neighbours[j]);
       if (other == part) continue;
-      QuotientEdge edge = {std::min(part, other), std::max(part, other), 0, {0, 0}};
-      if (part < other) edge.weight = graph_.edge_weights[j];
-      if (std::find(seen.begin(), seen.end(), other) == seen.end()) {
-        edge.border[part < other ? 0 : 1] = graph_.weights[static_cast<std::size_t>(v)];
-        seen.push_back(other);
-      }
-      edges.push_back(edge);
+      is_border = true;
+      Border& border = find(std::min(part, other), std::max(part, other));
+      if (part < other) border.edge.weight += graph_.edge_weights[j];
+      if (!border.vertices.empty() && border.vertices.back() == v) continue;
+      border.vertices.push_back(v);
+      border.edge.border[part < other ? 0 : 1] += graph_.weights[static_cast<std::size_t>(v)];
     }
-    const bool stays = !seen.empty() || is_at_copies_[static_cast<std::size_t>(v)] != 0;
-    is_candidate_[static_cast<std::size_t>(v)] = stays ? 1 : 0;
-    if (stays) still.push_back(v);
+    is_candidate_[static_cast<std::size_t>(v)] = is_border ? 1 : 0;
+    if (is_border) still.push_back(v);
   }
   candidates_ = std::move(still);
-  const auto merge = [&] {
-    std::stable_sort(edges.begin(), edges.end(), [](const QuotientEdge& a, const QuotientEdge& b) {
-      return std::pair(a.p, a.q) < std::pair(b.p, b.q);
-    });
-    std::vector<QuotientEdge> merged;
-    for (const QuotientEdge& edge : edges) {
-      if (merged.empty() || merged.back().p != edge.p || merged.back().q != edge.q) {
-        merged.push_back(edge);
-        continue;
-      }
-      merged.back().weight += edge.weight;
-      merged.back().border[0] += edge.border[0];
-      merged.back().border[1] += edge.border[1];
+  for (const LocalId v : recent_) is_recent_[static_cast<std::size_t>(v)] = 0;
+  recent_.clear();
+  borders_.clear();
+  std::vector<QuotientEdge> edges;
+  for (std::vector<Border>& borders : by_lower_part) {
+    for (Border& border : borders) {
+      edges.push_back(border.edge);
+      borders_[{border.edge.p, border.edge.q}] = std::move(border.vertices);
     }
-    edges = std::move(merged);
-  };
-  merge();
-  edges = gather_lists<QuotientEdge>(comm_, edges);
-  merge();
+  }
   return edges;
+}
+
+std::vector<QuotientEdge> PairRefiner::quotient() {
+  std::vector<QuotientEdge> edges = gather_lists<QuotientEdge>(comm_, local_quotient());
+  std::stable_sort(edges.begin(), edges.end(), [](const QuotientEdge& a, const QuotientEdge& b) {
+    return std::pair(a.p, a.q) < std::pair(b.p, b.q);
+  });
+  std::vector<QuotientEdge> merged;
+  for (const QuotientEdge& edge : edges) {
+    if (merged.empty() || merged.back().p != edge.p || merged.back().q != edge.q) {
+      merged.push_back(edge);
+      continue;
+    }
+    merged.back().weight += edge.weight;
+    merged.back().border[0] += edge.border[0];
+    merged.back().border[1] += edge.border[1];
+  }
+  return merged;
 }
 
 void PairRefiner::mark(LocalId vertex, std::vector<LocalId>& layer) {
@@ -135,14 +189,23 @@ void PairRefiner::hand_marks_to_owners(std::vector<LocalId>& layer) {
   std::fill(handed_.begin() + graph_.owned(), handed_.end(), 0);
 }
 
+/// Marks those of the vertices that are at the border of the pair.
+void PairRefiner::mark_seeds(const PairGoal& goal, std::span<const LocalId> vertices, std::vector<LocalId>& layer) {
+  for (const LocalId v : vertices) {
+    const int part = part_of(v);
+    if (part == goal.p ? touches(v, goal.q) : part == goal.q && touches(v, goal.p)) mark(v, layer);
+  }
+}
+
 std::vector<LocalId> PairRefiner::mark_bands(std::span<const PairGoal> goals) {
   ++round_;
   std::vector<LocalId> layer;
-  for (const LocalId v : candidates_) {
-    const int g = goal_of(v);
-    if (g < 0) continue;
-    const PairGoal& goal = goals[static_cast<std::size_t>(g)];
-    if (touches(v, part_of(v) == goal.p ? goal.q : goal.p)) mark(v, layer);
+  for (const PairGoal& goal : goals) {
+    const auto border = borders_.find({goal.p, goal.q});
+    if (border != borders_.end()) mark_seeds(goal, border->second, layer);
+  }
+  for (const LocalId v : recent_) {
+    if (goal_of(v) >= 0) mark_seeds(goals[static_cast<std::size_t>(goal_of(v))], {&v, 1}, layer);
   }
   int deepest = 1;
   for (const PairGoal& goal : goals) deepest = std::max(deepest, goal.depth);
@@ -263,14 +326,12 @@ void PairRefiner::apply(const std::vector<Answer>& answers) {
     mine.clear();
     for (const auto& [rank, list] : sparse_exchange(comm_, outgoing)) mine.insert(mine.end(), list.begin(), list.end());
   }
-  std::vector<LocalId> changed;
   for (const Answer& answer : mine) {
     const auto vertex = static_cast<LocalId>(answer.number - graph_.ownership.begin());
     parts_[static_cast<std::size_t>(vertex)] = static_cast<int>(answer.part);
-    changed.push_back(vertex);
+    note_change(vertex);
   }
-  note_changes(changed);
-  graph_.halo.update_copies(std::span<std::int32_t>(parts_), 1);
+  update_copies_of_parts();
 }
 
 std::vector<GlobalId> PairRefiner::improve(std::span<const PairGoal> goals, const RefinementSettings& settings) {
@@ -351,11 +412,9 @@ void PairRefiner::smooth(Real tolerance, const RefinementSettings& settings) {
 GlobalId PairRefiner::absorb_pieces() {
   const std::vector<int> before = parts_;
   const GlobalId absorbed = absorb_stray_pieces(comm_, graph_, parts_, loads_, targets_);
-  std::vector<LocalId> changed;
-  for (LocalId v = 0; v < graph_.owned(); ++v) {
-    if (before[static_cast<std::size_t>(v)] != part_of(v)) changed.push_back(v);
+  for (LocalId v = 0; v < graph_.vertices(); ++v) {
+    if (before[static_cast<std::size_t>(v)] != part_of(v)) note_change(v);
   }
-  note_changes(changed);
   return absorbed;
 }
 

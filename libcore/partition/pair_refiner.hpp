@@ -92,7 +92,11 @@ class PairRefiner {
   using PieceLists = std::map<int, std::vector<BandPiece>>;  ///< by goal
 
   void find_candidates();
-  void note_changes(std::span<const LocalId> changed);
+  void list_copy_neighbours();
+  void note_change(LocalId vertex);
+  void update_copies_of_parts();
+  std::vector<QuotientEdge> local_quotient();
+  void mark_seeds(const PairGoal& goal, std::span<const LocalId> vertices, std::vector<LocalId>& layer);
   std::vector<LocalId> mark_bands(std::span<const PairGoal> goals);
   void mark(LocalId vertex, std::vector<LocalId>& layer);
   void hand_marks_to_owners(std::vector<LocalId>& layer);
@@ -116,7 +120,11 @@ class PairRefiner {
   std::vector<Real> loads_;
   std::vector<LocalId> candidates_;  ///< owned vertices among which those at borders are
   std::vector<char> is_candidate_;
-  std::vector<char> is_at_copies_;  ///< owned vertices next to another rank's
+  std::map<std::pair<int, int>, std::vector<LocalId>> borders_;  ///< owned vertices at each border, by quotient()
+  std::vector<LocalId> recent_;                                  ///< those that may have come to a border since
+  std::vector<char> is_recent_;
+  std::vector<std::int64_t> copy_start_;  ///< owned neighbours of the copies: [copy + 1]
+  std::vector<LocalId> copy_neighbours_;
   std::vector<Real> handed_;        ///< [vertex] scratch: copies marked in this step
   std::vector<int> goal_of_part_;   ///< in the present round, -1 elsewhere
   std::vector<std::int32_t> mark_;  ///< [vertex] the round in which it is in a band
