@@ -160,6 +160,8 @@ Outcome Flow::solve(Real time) {
   const auto velocity = scene_.fields["velocity"].values();
   const std::vector<Real> old_velocity(velocity.begin(), velocity.end());
   const bool was_solved = is_solved_;
+  // Where the front has moved, the hierarchy of the flow before wastes iterations; and no run depends on its past.
+  linear_.reset();
   Outcome outcome = solve_with(drives, time);
   if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time);
   if (outcome.kind != Outcome::Kind::done) return outcome;

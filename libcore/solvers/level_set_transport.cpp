@@ -43,8 +43,8 @@ LevelSetTransport::LevelSetTransport(const Communicator& comm, const Mesh& mesh,
     : comm_(comm), mesh_(mesh), graph_(graph), options_(options), slots_(build_element_slots(mesh, graph)) {
   left_.entries.assign(graph.neighbours.size(), 0);
   convection_.entries.assign(graph.neighbours.size(), 0);
-  rates_.assign(static_cast<std::size_t>(mesh.elements()), 0);
-  active_elements_.resize(rates_.size());
+  rates_.assign(static_cast<std::size_t>(mesh.nodes()), 0);
+  active_elements_.resize(static_cast<std::size_t>(mesh.elements()));
   std::iota(active_elements_.begin(), active_elements_.end(), 0);
   active_rows_.resize(static_cast<std::size_t>(mesh.nodes()));
   std::iota(active_rows_.begin(), active_rows_.end(), 0);
@@ -82,13 +82,22 @@ Real LevelSetTransport::front_rate(std::span<const Real> velocity, std::span<con
 }
 
 void LevelSetTransport::compute_rates(std::span<const Real> velocity) {
+  std::vector<Real> sums(2 * rates_.size(), 0);  // [node] volume times rate, volume
   with_dim(mesh_.dim, [&](auto d) {
     constexpr int D = decltype(d)::value;
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
       const Point<D> mean = nodal_vectors<D>(mesh_, velocity, e).rowwise().mean();
-      rates_[static_cast<std::size_t>(e)] = streamline_rate<D>(p1_gradients<D>(simplex_points<D>(mesh_, e)), mean);
+      const auto p1 = p1_gradients<D>(simplex_points<D>(mesh_, e));
+      const Real crossed = p1.volume * streamline_rate<D>(p1, mean);
+      for (const LocalId node : mesh_.nodes_of_element(e)) {
+        sums[2 * static_cast<std::size_t>(node)] += crossed;
+        sums[2 * static_cast<std::size_t>(node) + 1] += p1.volume;
+      }
     }
   });
+  mesh_.node_halo.add_to_owners(sums, 2);
+  mesh_.node_halo.update_copies(sums, 2);
+  for (std::size_t n = 0; n < rates_.size(); ++n) rates_[n] = sums[2 * n + 1] > 0 ? sums[2 * n] / sums[2 * n + 1] : 0;
 }
 
 std::vector<char> LevelSetTransport::mark_nodes(std::span<const char> element_marks) const {
@@ -104,7 +113,7 @@ std::vector<char> LevelSetTransport::mark_nodes(std::span<const char> element_ma
 
 Real LevelSetTransport::largest_front_rate(std::span<const Real> level_set) const {
   // Elements that the front only touches count: it may stand on the faces of a gate.
-  std::vector<char> is_touched(rates_.size(), 0);
+  std::vector<char> is_touched(static_cast<std::size_t>(mesh_.elements()), 0);
   for (LocalId e = 0; e < mesh_.elements(); ++e) {
     bool has_inside = false, has_outside = false;
     for (const LocalId n : mesh_.nodes_of_element(e)) {
@@ -115,18 +124,15 @@ Real LevelSetTransport::largest_front_rate(std::span<const Real> level_set) cons
   }
   const std::vector<char> near = mark_nodes(is_touched);
   Real rate = 0;
-  for (LocalId e = 0; e < mesh_.elements(); ++e) {
-    const auto nodes = mesh_.nodes_of_element(e);
-    const bool is_near =
-        std::any_of(nodes.begin(), nodes.end(), [&](LocalId n) { return near[static_cast<std::size_t>(n)] != 0; });
-    if (is_near) rate = std::max(rate, rates_[static_cast<std::size_t>(e)]);
+  for (std::size_t n = 0; n < rates_.size(); ++n) {
+    if (near[n] != 0) rate = std::max(rate, rates_[n]);
   }
   return comm_.max(rate);
 }
 
 Real LevelSetTransport::largest_step(std::span<const Real> level_set) const {
   Real anywhere = 0;
-  for (const LocalId e : active_elements_) anywhere = std::max(anywhere, rates_[static_cast<std::size_t>(e)]);
+  for (const LocalId n : active_rows_) anywhere = std::max(anywhere, rates_[static_cast<std::size_t>(n)]);
   const Real rate = std::max(largest_front_rate(level_set) / options_.front_cfl, comm_.max(anywhere) / far_cfl);
   return rate > 0 ? 1 / rate : 1e300;
 }
@@ -137,7 +143,7 @@ void LevelSetTransport::choose_active(std::span<Real> level_set) {
   band_width_ = options_.narrow_band * comm_.max(size);
   if (band_width_ == 0) return;
   clip(level_set);
-  std::vector<char> is_inner(rates_.size(), 0);
+  std::vector<char> is_inner(static_cast<std::size_t>(mesh_.elements()), 0);
   for (LocalId e = 0; e < mesh_.elements(); ++e) {
     const auto nodes = mesh_.nodes_of_element(e);
     is_inner[static_cast<std::size_t>(e)] = std::any_of(nodes.begin(), nodes.end(), [&](LocalId n) {

@@ -47,8 +47,9 @@ class LevelSetTransport {
   TransportReport advance(std::span<const Real> velocity, std::span<Real> level_set, Real dt,
                           const ImposedLevelSet& imposed);
 
-  /// Largest |v| / h_v [1/s] over the elements that the front touches and those around them: 1 / the time the front
-  /// takes to cross an element. Collective.
+  /// 1 / the time the front takes to cross an element [1/s]: the largest of the nodes of the elements that it touches.
+  /// A node's rate is the mean of |v| / h_v over the elements around it, weighted by volume: a sliver counts by the
+  /// little that it holds, where a largest value over elements would let it stop the run. Collective.
   Real front_rate(std::span<const Real> velocity, std::span<const Real> level_set);
 
  private:
@@ -68,7 +69,7 @@ class LevelSetTransport {
   ElementSlots slots_;
   NodeMatrix left_;  ///< mass + dt/2 convection
   NodeMatrix convection_;
-  std::vector<Real> rates_;  ///< |v| / h_v of each element [1/s]
+  std::vector<Real> rates_;  ///< [node] mean |v| / h_v of the elements around it, 1/s
   std::vector<LocalId> active_rows_;
   std::vector<LocalId> active_elements_;
   Real band_width_ = 0;  ///< m

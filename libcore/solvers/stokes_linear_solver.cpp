@@ -113,23 +113,34 @@ class StokesLinearSolver::Implementation {
     log::warning("linear solver: {} after {} iterations; trying {}", outcome.reason, outcome.iterations, step.name);
   }
 
-  /// Runs a step with the set-up that is kept, and again with a new one where that fails.
+  /// Runs a step with the set-up that is kept, for about as long as a new one would take; where that does not do, with
+  /// a new one from where the other came.
   void run_step(const Step& step, KrylovProblem& problem, const BorderedOperator& op, Real tolerance,
                 LinearOutcome& outcome) {
     const bool keeps =
         options_.reuse_setup && setup_ && setup_->settings == step.settings && setup_->borders == op.borders();
     if (!keeps) setup_.reset();
-    const std::uint64_t version = op.system().value_version;
-    run_once(step, problem, op, tolerance, outcome);
-    if (problem.residual() <= tolerance || !setup_ || setup_->value_version == version) return;
+    const bool is_stale = setup_ && setup_->value_version != op.system().value_version;
+    const int most = is_stale ? patience(problem.residual(), tolerance) : options_.max_iterations;
+    run_once(step, problem, op, tolerance, most, outcome);
+    if (problem.residual() <= tolerance || !is_stale) return;
     setup_.reset();
-    run_once(step, problem, op, tolerance, outcome);
+    run_once(step, problem, op, tolerance, options_.max_iterations, outcome);
   }
 
-  void run_once(const Step& step, KrylovProblem& problem, const BorderedOperator& op, Real tolerance,
+  /// Iterations to spend with a set-up that was made for another system.
+  int patience(Real residual, Real tolerance) const {
+    constexpr int least = 10;
+    const Real digits = std::log10(residual / tolerance);
+    const Real expected = growth_allowed * setup_->iterations_per_digit * std::max(digits, 0.0);
+    return std::min(options_.max_iterations, least + static_cast<int>(expected));
+  }
+
+  void run_once(const Step& step, KrylovProblem& problem, const BorderedOperator& op, Real tolerance, int most,
                 LinearOutcome& outcome) {
     const Real before = problem.residual();
     LinearSolverOptions options = options_;
+    options.max_iterations = most;
     if (outcome.fallbacks > 0) options.restart = std::max(options.restart, fallback_restart);
     const auto provide = [&]() -> StokesPreconditioner& { return provide_preconditioner(step, op, outcome); };
     const KrylovProblem::Run run = problem.run(step.method, tolerance, options, provide);
