@@ -8,9 +8,11 @@
 namespace malleus::forge {
 namespace {
 
-constexpr int most_searches = 4;  ///< of contact points in one solve, where tools are curved
-constexpr int most_passes = 12;   ///< of augmentation and friction limits
-constexpr int most_plans = 25;    ///< of a hydraulic press
+constexpr int most_searches = 4;        ///< of contact points in one solve, where tools are curved
+constexpr int most_passes = 12;         ///< of augmentation and friction limits
+constexpr int most_plans = 25;          ///< of a hydraulic press
+constexpr int tries_before_picard = 3;  ///< of an increment, each with half the step
+constexpr int most_picard_steps = 400;
 /// A node may end this share of an edge deeper in a tool than its linearised gap says.
 constexpr Real tolerated_surprise = 0.02;
 
@@ -88,6 +90,8 @@ void ContactFlow::roll_back() {
 Outcome ContactFlow::advance(const Increment& increment) {
   save();
   report_ = {};
+  tries_ = increment.number == tried_increment_ ? tries_ + 1 : 1;
+  tried_increment_ = increment.number;
   const std::vector<Real> start = scene_.mesh.coordinates;
   const Outcome outcome = run_stages(increment);
   scene_.mesh.coordinates = start;
@@ -321,24 +325,48 @@ void ContactFlow::volume_targets(const Displacement& way, StokesLoads& loads) {
 }
 
 /// The Newton loop; where a linear solve hits the floor of rounding (stiff penalties, sharp tolerances) again with
-/// looser ones, for it is the nonlinear residual that decides.
+/// looser ones, for it is the nonlinear residual that decides. Where shorter steps did not help, Picard's method.
 Outcome ContactFlow::run_newton(Real tolerance) {
+  NewtonOptions options;
+  options.tolerance = tolerance;
+  options.linear_tolerance = scene_.solver.linear_tolerance;
+  options.max_iterations = scene_.solver.max_newton;
+  const std::vector<Real> start = state_.nodes;
   Outcome outcome = Outcome::done();
-  Real linear_tolerance = scene_.solver.linear_tolerance;
-  for (int attempt = 0; attempt < 3; ++attempt, linear_tolerance = std::min(1e2 * linear_tolerance, 1e-2)) {
-    const NewtonOutcome newton = run_newton_once(tolerance, linear_tolerance);
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const NewtonOutcome newton = run_newton_once(options);
     if (newton.converged) return Outcome::done();
     outcome = Outcome::retry(newton.reason);
     if (newton.reason.find("linear solver") == std::string::npos) break;
+    options.linear_tolerance = std::min(1e2 * options.linear_tolerance, 1e-2);
   }
-  return outcome;
+  if (tries_ <= tries_before_picard) return outcome;
+  state_.nodes = start;
+  return run_picard(tolerance);
 }
 
-NewtonOutcome ContactFlow::run_newton_once(Real tolerance, Real linear_tolerance) {
+Outcome ContactFlow::run_picard(Real tolerance) {
   NewtonOptions options;
   options.tolerance = tolerance;
-  options.linear_tolerance = linear_tolerance;
-  options.max_iterations = scene_.solver.max_newton;
+  options.linear_tolerance = scene_.solver.linear_tolerance;
+  options.picard_alone = true;
+  // It contracts by 1 - m: so many iterations, and half as many again for contacts, lead to the tolerance.
+  const Real contraction = std::max(1 - scene_.viscosity->sensitivity(), 0.1);
+  options.max_iterations = most_picard_steps;
+  if (contraction < 1) {
+    const Real needed = 20 + 1.5 * std::log(tolerance) / std::log(contraction);
+    options.max_iterations = static_cast<int>(std::min<Real>(needed, most_picard_steps));
+  }
+  log::info("Newton's method did not converge in shorter steps: Picard's method, {} iterations at most",
+            options.max_iterations);
+  const NewtonOutcome picard = run_newton_once(options);
+  if (picard.converged) return Outcome::done();
+  return Outcome::fail("neither Newton's nor Picard's method converges, in steps cut " + std::to_string(tries_ - 1) +
+                       " times: " + picard.reason);
+}
+
+NewtonOutcome ContactFlow::run_newton_once(const NewtonOptions& asked) {
+  NewtonOptions options = asked;
   if (is_cold_) options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
   const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
   report_.newton_iterations += outcome.iterations();

@@ -93,7 +93,8 @@ class ContactFlow final : public Component {
   void rest();
   void prepare_operator(const Stage& stage);
   Outcome run_newton(Real tolerance);
-  NewtonOutcome run_newton_once(Real tolerance, Real linear_tolerance);
+  NewtonOutcome run_newton_once(const NewtonOptions& asked);
+  Outcome run_picard(Real tolerance);
   void volume_targets(const Displacement& displacement, StokesLoads& loads);
 
   /// Slips of the contact points at the solution, and from them pressures, gaps and what is remembered. Whether the
@@ -123,6 +124,8 @@ class ContactFlow final : public Component {
   std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
   bool has_contacts_ = false;                 ///< on any rank
   bool is_cold_ = true;                       ///< no solution tells Newton's method where to start
+  GlobalId tried_increment_ = -1;
+  int tries_ = 0;  ///< of that increment
   FlowReport report_;
   FlowTotals totals_;
   Saved saved_;

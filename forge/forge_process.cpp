@@ -130,10 +130,23 @@ Real ForgeProcess::planned_strain() const {
   return by_level[static_cast<std::size_t>(case_.common.accuracy.level)];
 }
 
+/// The step in which the schemes' error of third order keeps the volume to a share by level, by the last step's loss.
+Real ForgeProcess::volume_step() const {
+  constexpr std::array<Real, n_levels> by_level = {3e-3, 1e-3, 3e-4, 1e-4};
+  const Real share = by_level[static_cast<std::size_t>(case_.common.accuracy.level)];
+  const Progress& progress = scene_->progress;
+  if (scene_->motion.scheme == TimeScheme::euler || !(progress.last_step > 0)) return no_limit;
+  Real step = no_limit;
+  for (const Real loss : progress.volume_losses) {
+    if (loss != 0) step = std::min(step, progress.last_step * std::cbrt(share / std::abs(loss)));
+  }
+  return step;
+}
+
 Real ForgeProcess::largest_step() {
   const Real edge_rate = flow_.largest_edge_rate() > 0 ? flow_.largest_edge_rate() : scene_->scale.rate();
   const Real strain_rate = flow_.largest_strain_rate() > 0 ? flow_.largest_strain_rate() : scene_->scale.rate();
-  Real step = std::min(scene_->motion.edge_share / edge_rate, planned_strain() / strain_rate);
+  Real step = std::min({scene_->motion.edge_share / edge_rate, planned_strain() / strain_rate, volume_step()});
   for (std::size_t t = 0; t < scene_->tools.size(); ++t) {
     if (flow_.report().tool_forces.empty()) break;
     const Tool& tool = scene_->tools[t];

@@ -55,6 +55,7 @@ class ForgeProcess final : public Process {
   std::optional<Real> leading_stroke() const;
   Real leading_speed() const;
   Real planned_strain() const;
+  Real volume_step() const;
   Real volume_change() const;
   RemeshedScene remeshed_scene();
   void mesh_changed();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "base/log.hpp"
 #include "mesh/simplex.hpp"
 
 namespace malleus::forge {
@@ -11,6 +12,10 @@ namespace {
 
 /// An increment is given up where an edge changes by more than this times the share that steps are planned for.
 constexpr Real tolerance_of_share = 2;
+/// A step of a second-order scheme in which a body's volume drifts by more than this share is given up.
+constexpr Real tolerated_drift = 5e-3;
+/// From this share on the user is told of the volume that is lost in all.
+constexpr Real alarming_loss = 1e-2;
 
 }  // namespace
 
@@ -34,6 +39,7 @@ Outcome Motion::advance(const Increment& increment) {
   saved_progress_ = scene_.progress;
   if (const Outcome outcome = check_edges(increment.dt); outcome.kind != Outcome::Kind::done) return outcome;
   if (const Outcome outcome = move(increment.dt); outcome.kind != Outcome::Kind::done) return outcome;
+  if (const Outcome outcome = check_volumes(); outcome.kind != Outcome::Kind::done) return outcome;
   integrate_strain(increment.dt);
   account_volume();
   account_strokes(increment);
@@ -96,6 +102,33 @@ void Motion::integrate_strain(Real dt) {
   for (std::size_t e = 0; e < strain.size(); ++e) strain[e] += dt * scene_.step_strain_rate[e];
 }
 
+/// Steps so long that the scheme's error shows in the volume. Euler's, whose error is known, is taken as it is.
+Outcome Motion::check_volumes() {
+  if (scene_.motion.scheme == TimeScheme::euler) return Outcome::done();
+  const std::vector<Real> volumes = body_volumes(scene_);
+  for (std::size_t region = 0; region < scene_.bodies.size(); ++region) {
+    const Body& body = scene_.bodies[region];
+    if (!body.is_deformable() || !(body.volume > 0)) continue;
+    const Real drift = std::log(volumes[region] / body.volume) - scene_.progress.asked_strains[region];
+    if (std::abs(drift) <= tolerated_drift) continue;
+    scene_.mesh.coordinates = saved_coordinates_;
+    return Outcome::retry(fmt::format("the volume of {} would change by {:.2g} %", body.name, 100 * drift));
+  }
+  return Outcome::done();
+}
+
+void Motion::warn_of_loss() {
+  Real start = 0;
+  for (const Body& body : scene_.bodies) start += body.is_deformable() ? body.start_volume : 0;
+  const Real change = start > 0 ? scene_.deformable_volume() / start - 1 : 0;
+  if (std::abs(change) < alarming_loss || has_warned_) return;
+  has_warned_ = true;
+  log::warn(
+      fmt::format("the volume of the bodies has changed by {:.2g} %: shorten the steps ([time] step, [motion] "
+                  "strain){}",
+                  100 * change, scene_.motion.scheme == TimeScheme::euler ? " or leave scheme = euler" : ""));
+}
+
 /// What the motion lost beyond what was asked back: the drift that there were without volume targets.
 void Motion::account_volume() {
   const std::vector<Real> volumes = body_volumes(scene_);
@@ -112,6 +145,7 @@ void Motion::account_volume() {
     body.volume = volumes[region];
   }
   if (start > 0) scene_.progress.raw_volume_drift += change / start;
+  warn_of_loss();
 }
 
 void Motion::account_strokes(const Increment& increment) {

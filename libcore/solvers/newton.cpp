@@ -215,7 +215,7 @@ void Loop::solve_nonlinear_problem() {
       return;
     }
     choose_branches(iteration, cold);
-    const bool newton = !first && picard_left <= 0;
+    const bool newton = !first && picard_left <= 0 && !options_.picard_alone;
     if (!first && !newton) --picard_left;
     const Real tolerance = newton ? forcing(previous_norm) : loosest_forcing;
     previous_norm = newton ? sound_norm() : 0;

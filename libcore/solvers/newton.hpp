@@ -13,6 +13,7 @@ struct NewtonOptions {
   Real tolerance = 1e-4;         ///< relative nonlinear residual, contact terms included
   Real linear_tolerance = 1e-6;  ///< of linear problems, and of the last linear solve of the loop
   int max_iterations = 40;       ///< Picard steps counted
+  bool picard_alone = false;     ///< no Newton steps: slow (contracts by 1 - m) and sure
   int max_cuts = 8;              ///< of one step by the line search
   int set_iterations = 15;       ///< in which each step holds the branches of terms (contacts) as they are at its start
   /// Shear rate [1/s] at which viscosities are taken for the first step from a cold start; 0 = take the start state's.

@@ -228,6 +228,47 @@ class WrongScenes(Forging):
                          "[body_force] y", ranks=(1, 2, 4))
 
 
+class Robustness(Forging):
+    def stick(self, m, *options, check=True):
+        box_mesh(self.directory / "box.msh", 2, cells=(6, 6))
+        text = case_text(m, 2, 1, "tools", time="increments = 2\nstep = 0.02")
+        text = text.replace("shape = plane\n", "shape = plane\nfriction = 1e3\n")
+        (self.directory / "case.ini").write_text(text)
+        return run("forge", self.directory / "case.ini", self.directory / "out", *options, check=check)
+
+    def test_picard_helps_where_newton_fails(self):
+        self.stick(0.3)
+        expected = history(self.directory / "out")[0]["force_upper_y_N"]
+        said = self.stick(0.3, "-D", "solver.max_newton=2").stdout
+        self.assertIn("Picard's method", said)
+        row = history(self.directory / "out")[0]
+        self.assertAlmostEqual(row["dt_s"], 0.02 / 8, delta=1e-9)
+        self.assertAlmostEqual(row["force_upper_y_N"] / expected, 1, delta=1e-3)
+
+    def test_what_does_not_converge_is_never_accepted(self):
+        result = self.stick(0.3, "-D", "solver.newton_tolerance=1e-15", "-D", "solver.linear_tolerance=1e-12", check=False)
+        self.assertEqual(result.returncode, 3)
+        for part in ("neither Newton's nor Picard's method converges", "worst at (", "The last good state is that of increment 0"):
+            self.assertIn(part, result.stderr)
+        self.assertEqual(summary(self.directory / "out")["exit_code"], 3)
+
+    def test_steps_that_lose_volume_are_shortened(self):
+        for dim in (2, 3):
+            box_mesh(self.directory / "box.msh", dim)
+            text = case_text(0.3, dim, 1, "tools", time="stroke = 0.5\nstep = 0.3")
+            text = text.replace("shape = plane\n", "shape = plane\nfriction = 1\n")
+            rows = self.forge(text)
+            self.assertLess(max(row["dt_s"] for row in rows), 0.2)
+            self.assertLess(max(abs(row["volume_change"]) for row in rows), 1e-2)
+            self.assertLess(abs(rows[-1]["volume_change"]), 2e-3)
+
+    def test_lost_volume_is_told(self):
+        box_mesh(self.directory / "box.msh", 2)
+        self.forge(case_text(0.3, 2, 1, "boundaries", time="increments = 3\nstep = 0.1"), "-D", "motion.scheme=euler")
+        warnings = summary(self.directory / "out")["warnings"]
+        self.assertEqual(sum("the volume of the bodies has changed by" in text for text in warnings), 1)
+
+
 class Contact(Forging):
     def blocks(self, dim, lower_cells, upper_cells, time="increments = 1\nstep = 1e-3", consistency=K):
         mesh = BoxMesh(dim)
