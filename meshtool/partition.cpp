@@ -14,6 +14,7 @@
 #include "meshtool/mesh_files.hpp"
 #include "meshtool/options.hpp"
 #include "parallel/agreement.hpp"
+#include "partition/interface_release.hpp"
 #include "partition/migrate.hpp"
 #include "storage/atomic_file.hpp"
 #include "storage/mesh_file.hpp"
@@ -32,6 +33,7 @@ struct PartitionCommand {
   std::string parts_file;
   std::string report;
   std::string method = "refined";
+  std::string release;
   PartitionOptions options;
   Real length_unit = 1;
 };
@@ -64,6 +66,10 @@ void add_options(CLI::App& app, PartitionCommand& c) {
       ->type_name("FILE.txt");
   app.add_option("--report", c.report, "Writes measures and times as JSON")->type_name("FILE.json");
   app.add_option("--method", c.method, "refined (default) or curve")->check(CLI::IsMember({"refined", "curve"}));
+  app.add_option("--release", c.release,
+                 "With --from: moves the borders between the parts inside them, as a remesher wants; balanced, or "
+                 "shifted by a layer whatever the loads")
+      ->check(CLI::IsMember({"balanced", "shifted"}));
   app.add_option("--tolerance", c.options.tolerance, "Imbalance of the work aimed at (default 0.01)")
       ->check(CLI::Range(1e-6, 1.0));
   app.add_option("--length-unit", c.length_unit, "Metres per unit of length in IN (default 1)")
@@ -178,6 +184,28 @@ void print_plan(const PartitionPlan& plan, int parts) {
   }
 }
 
+/// Not the cheapest partition, but the present one with its borders moved inside.
+PartitionPlan release_plan(const Communicator& comm, const Mesh& mesh, const PartitionCommand& command,
+                           const Architecture& architecture, std::span<const int> from) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<Real> work = element_work(comm, mesh, command.model);
+  ReleaseOptions options;
+  options.tolerance = command.options.tolerance;
+  options.balanced = command.release == "balanced";
+  ReleaseReport report;
+  PartitionPlan plan;
+  plan.parts = move_interfaces_inside(comm, mesh, work, architecture, from, options, &report);
+  plan.seconds["divide"] = comm.max(std::chrono::duration<Real>(std::chrono::steady_clock::now() - start).count());
+  const WorkGraph graph = build_work_graph(comm, mesh, work);
+  plan.before = partition_cost(comm, mesh, graph, command.model, architecture, from);
+  plan.after = partition_cost(comm, mesh, graph, command.model, architecture, plan.parts);
+  plan.moved_elements = report.moved_elements;
+  plan.moved = static_cast<Real>(report.moved_elements) / static_cast<Real>(mesh.total_elements);
+  plan.made_by =
+      fmt::format("release of {} of {} interface nodes", report.interface_nodes - report.still, report.interface_nodes);
+  return plan;
+}
+
 /// Wall time of the steps of a command.
 class StepClock {
  public:
@@ -212,6 +240,7 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
   add_options(app, command);
   if (!parse_options(comm, app, arguments)) return exit_code::done;
   refuse_unknown_ending(command.output);
+  if (!command.release.empty() && command.from.empty()) throw InputError("command line: --release wants --from");
   command.options.method = command.method == "curve" ? Partitioner::curve : Partitioner::refined;
   const Architecture architecture = command.architecture.empty()
                                         ? equal_architecture(command.parts)
@@ -223,7 +252,9 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
   std::vector<int> from;
   if (!command.from.empty()) from = read_parts(comm, mesh, command.from, command.parts);
   clock.end(comm, "read");
-  const PartitionPlan plan = make_partition(comm, mesh, command.model, architecture, command.options, from);
+  const PartitionPlan plan = !command.release.empty()
+                                 ? release_plan(comm, mesh, command, architecture, from)
+                                 : make_partition(comm, mesh, command.model, architecture, command.options, from);
   clock.end(comm, "partition");
   write_result(comm, command, mesh, fields, plan);
   clock.end(comm, "write");

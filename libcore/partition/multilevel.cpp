@@ -60,7 +60,7 @@ std::vector<int> refine_level(const Communicator& comm, const WorkGraph& graph, 
   PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
   if (is_coarsest || refiner.imbalance() > tolerance) {
     refiner.diffuse(0.6 * tolerance, is_coarsest ? 30 : 6);
-    if (refiner.absorb_pieces() > 0) refiner.diffuse(0.6 * tolerance, 4);
+    refiner.tidy(0.6 * tolerance);
   }
   refiner.smooth(tolerance, settings);
   parts = std::move(refiner).take_parts();
@@ -86,8 +86,7 @@ std::vector<int> refine_finest(const Communicator& comm, const WorkGraph& graph,
   PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
   refiner.diffuse(0.9 * settings.tolerance, rounds);
   refiner.smooth(settings.tolerance, {settings.fine_passes, 3, 2, 300});
-  for (int sweep = 0; sweep < 3 && refiner.absorb_pieces() > 0; ++sweep) {
-    refiner.diffuse(settings.tolerance, 4);
+  for (int sweep = 0; sweep < 3 && refiner.tidy(settings.tolerance); ++sweep) {
     refiner.smooth(settings.tolerance, {1, 3, 1, 100});
   }
   parts = std::move(refiner).take_parts();

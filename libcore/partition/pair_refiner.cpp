@@ -13,14 +13,23 @@ namespace malleus {
 
 PairRefiner::PairRefiner(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
                          std::vector<int> parts, std::vector<Real> targets)
-    : comm_(comm), graph_(graph), architecture_(architecture), parts_(std::move(parts)), targets_(std::move(targets)) {
-  check(parts_.size() == static_cast<std::size_t>(graph.vertices()), "each vertex has a part, copies too");
-  loads_ = part_loads(comm, graph, parts_, architecture.parts());
+    : comm_(comm), graph_(graph), architecture_(architecture), targets_(std::move(targets)) {
   goal_of_part_.assign(targets_.size(), -1);
-  mark_.assign(parts_.size(), 0);
-  handed_.assign(comm.size() > 1 ? parts_.size() : 0, 0);
-  find_candidates();
+  start(std::move(parts));
   list_copy_neighbours();
+}
+
+void PairRefiner::start(std::vector<int> parts) {
+  check(parts.size() == static_cast<std::size_t>(graph_.vertices()), "each vertex has a part, copies too");
+  parts_ = std::move(parts);
+  loads_ = part_loads(comm_, graph_, parts_, architecture_.parts());
+  mark_.assign(parts_.size(), 0);
+  round_ = 0;
+  handed_.assign(comm_.size() > 1 ? parts_.size() : 0, 0);
+  candidates_.clear();
+  recent_.clear();
+  borders_.clear();
+  find_candidates();
 }
 
 Real PairRefiner::imbalance() const {
@@ -416,6 +425,16 @@ GlobalId PairRefiner::absorb_pieces() {
     if (before[static_cast<std::size_t>(v)] != part_of(v)) note_change(v);
   }
   return absorbed;
+}
+
+bool PairRefiner::tidy(Real tolerance) {
+  const std::vector<int> before = parts_;
+  const Real allowed = std::max(1.5 * tolerance, 1.1 * imbalance());
+  if (absorb_pieces() == 0) return false;
+  diffuse(tolerance, 4);
+  if (imbalance() <= allowed) return true;
+  start(before);
+  return false;
 }
 
 std::vector<std::vector<std::size_t>> disjoint_rounds(std::span<const std::pair<int, int>> pairs, int n_parts) {

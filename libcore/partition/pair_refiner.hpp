@@ -76,6 +76,10 @@ class PairRefiner {
   /// absorb_stray_pieces(). Collective.
   GlobalId absorb_pieces();
 
+  /// absorb_pieces() and flows to make up for it, undone where they end with loads out of balance: bodies that do not
+  /// hang together want parts of several pieces. Returns whether something was absorbed. Collective.
+  bool tidy(Real tolerance);
+
   /// One round: the goals' parts are disjoint. Returns how many vertices changed part, for each goal. Collective.
   std::vector<GlobalId> improve(std::span<const PairGoal> goals, const RefinementSettings& settings);
 
@@ -91,6 +95,7 @@ class PairRefiner {
   };
   using PieceLists = std::map<int, std::vector<BandPiece>>;  ///< by goal
 
+  void start(std::vector<int> parts);
   void find_candidates();
   void list_copy_neighbours();
   void note_change(LocalId vertex);

@@ -190,7 +190,7 @@ class Planner {
       PairRefiner refiner(comm_, graph_, architecture_, std::move(parts), targets);
       refiner.diffuse(0.003, 6);
       refiner.smooth(0.004, {2, 3, 1, 100});
-      if (refiner.absorb_pieces() > 0) refiner.diffuse(0.003, 2);
+      refiner.tidy(0.003);
       current.parts = std::move(refiner).take_parts();
       current.parts.resize(static_cast<std::size_t>(graph_.owned()));
       current.cost = cost_of(current.parts);

@@ -158,6 +158,7 @@ WorkGraph build_work_graph(const Communicator& comm, const Mesh& mesh, std::span
   graph.start.assign(1, 0);
   for (std::size_t slot = 0; slot < across.size(); ++slot) {
     if (const GlobalId element = across[slot]; element >= 0) {
+      graph.faces.push_back(static_cast<signed char>(slot % sides));
       const auto copy = std::lower_bound(graph.copy_numbers.begin(), graph.copy_numbers.end(), element);
       graph.neighbours.push_back(graph.ownership.owns(element)
                                      ? static_cast<LocalId>(element - graph.ownership.begin())

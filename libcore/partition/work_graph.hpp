@@ -31,6 +31,7 @@ struct WorkGraph {
   std::vector<std::int64_t> start;         ///< [owned + 1]
   std::vector<LocalId> neighbours;         ///< vertices, copies among them
   std::vector<std::int32_t> edge_weights;  ///< [edge] common faces
+  std::vector<signed char> faces;          ///< [edge] which face of the element it is; only where vertices are elements
   std::vector<Real> weights;               ///< [owned] work in whole multiples of a unit, so that sums are exact
   std::vector<Real> centres;               ///< [owned][dim], m
   Real unit = 1;                           ///< work that a weight of 1 stands for

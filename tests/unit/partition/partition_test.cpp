@@ -1,0 +1,228 @@
+#include "partition/partition.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "base/error.hpp"
+#include "partition/interface_release.hpp"
+#include "partition/node_parts.hpp"
+#include "support/box_mesh.hpp"
+#include "support/world.hpp"
+
+namespace malleus {
+namespace {
+
+using test::world;
+
+Mesh box(int dim, int cells) {
+  test::BoxMeshOptions options;
+  options.dim = dim;
+  options.cells = {2 * cells, cells, cells};
+  options.high = {2, 1, 1};
+  return test::box_mesh(world(), options);
+}
+
+/// Parts as numbers of the given count, all elements of all ranks among them.
+void expect_parts(const Mesh& mesh, const std::vector<int>& parts, int n_parts) {
+  ASSERT_EQ(parts.size(), static_cast<std::size_t>(mesh.elements()));
+  for (const int part : parts) {
+    EXPECT_GE(part, 0);
+    EXPECT_LT(part, n_parts);
+  }
+}
+
+class Partitions : public testing::TestWithParam<int> {};
+
+TEST_P(Partitions, AreBalancedInOnePieceAndBeatTheCurve) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  for (const int n_parts : {2, 7}) {
+    const Architecture machine = equal_architecture(n_parts);
+    PartitionOptions options;
+    options.tolerance = 0.03;
+    const PartitionPlan plan = make_partition(world(), mesh, {}, machine, options);
+    expect_parts(mesh, plan.parts, n_parts);
+    EXPECT_LE(plan.after.imbalance, 0.035) << n_parts;
+    EXPECT_EQ(plan.after.stray_pieces, 0);
+    EXPECT_EQ(plan.after.empty_parts, 0);
+    options.method = Partitioner::curve;
+    const PartitionPlan curve = make_partition(world(), mesh, {}, machine, options);
+    EXPECT_LE(plan.after.cut, curve.after.cut);
+    EXPECT_EQ(curve.made_by, "curve");
+  }
+}
+
+TEST_P(Partitions, FollowTheSpeedsOfTheProcessors) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  Architecture machine = equal_architecture(4);
+  machine.speed = {1, 2, 3, 4};
+  const PartitionPlan plan = make_partition(world(), mesh, {}, machine, {});
+  EXPECT_LE(plan.after.imbalance, 0.2);  // the work is shifted to where less is exchanged
+  std::vector<Real> counts(4, 0);
+  for (const int part : plan.parts) counts[static_cast<std::size_t>(part)] += 1;
+  world().sum_in_place(std::span<Real>(counts));
+  for (std::size_t p = 0; p < 4; ++p) {
+    EXPECT_NEAR(counts[p] / static_cast<Real>(mesh.total_elements), machine.speed[p] / 10, 0.04);
+  }
+}
+
+TEST_P(Partitions, AvoidSlowLinks) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 7);
+  Architecture machine = equal_architecture(4);
+  machine.cluster = {0, 0, 1, 1};
+  machine.cluster_bandwidth = 0.05;
+  const PartitionPlan blind = make_partition(world(), mesh, {}, equal_architecture(4), {});
+  WorkModel model;
+  const WorkGraph graph = build_work_graph(world(), mesh, element_work(world(), mesh, model));
+  const PartitionPlan aware = make_partition(world(), mesh, model, machine, {});
+  EXPECT_LE(aware.after.cost, partition_cost(world(), mesh, graph, model, machine, blind.parts).cost + 1e-12);
+}
+
+TEST_P(Partitions, AreTheSameTwice) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 12 : 4);
+  const auto make = [&] { return make_partition(world(), mesh, {}, equal_architecture(5), {}); };
+  const PartitionPlan first = make();
+  const PartitionPlan second = make();
+  EXPECT_EQ(first.parts, second.parts);
+  EXPECT_EQ(first.after.times, second.after.times);
+}
+
+TEST_P(Partitions, APlanWithoutGainMovesNothing) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 12 : 4);
+  const Architecture machine = equal_architecture(3);
+  PartitionPlan plan = make_partition(world(), mesh, {}, machine, {});
+  for (int round = 0; round < 4 && (round == 0 || plan.moved_elements > 0); ++round) {
+    plan = make_partition(world(), mesh, {}, machine, {}, plan.parts);
+  }
+  EXPECT_EQ(plan.moved_elements, 0);
+  EXPECT_EQ(plan.moved, 0);
+  EXPECT_EQ(plan.after.cost, plan.before.cost);
+}
+
+TEST_P(Partitions, ARepairNeverCostsMoreAndMovesLess) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  const Architecture machine = equal_architecture(6);
+  const PartitionPlan even = make_partition(world(), mesh, {}, machine, {});
+  WorkModel model;
+  model.factor.assign(static_cast<std::size_t>(mesh.elements()), 1);
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    if (mesh.point(mesh.nodes_of_element(e)[0])[0] < 0.2) model.factor[static_cast<std::size_t>(e)] = 2;
+  }
+  const PartitionPlan repaired = make_partition(world(), mesh, model, machine, {}, even.parts);
+  EXPECT_LT(repaired.after.cost, repaired.before.cost);
+  EXPECT_LE(repaired.after.imbalance, 0.05);
+  EXPECT_GT(repaired.moved, 0);
+  EXPECT_LT(repaired.moved, 0.5);
+}
+
+TEST_P(Partitions, TakeAnyWeightsAndMorePartsThanElements) {
+  const Mesh mesh = box(GetParam(), 1);
+  const int n_parts = 100;
+  const PartitionPlan plan = make_partition(world(), mesh, {}, equal_architecture(n_parts), {});
+  expect_parts(mesh, plan.parts, n_parts);
+  EXPECT_GE(plan.after.empty_parts, n_parts - mesh.total_elements);
+  WorkModel model;
+  for (LocalId e = 0; e < mesh.elements(); ++e) model.factor.push_back(e % 3 == 0 ? 0 : e % 3 == 1 ? 1 : 1e9);
+  expect_parts(mesh, make_partition(world(), mesh, model, equal_architecture(3), {}).parts, 3);
+  model.factor.assign(model.factor.size(), 0);
+  EXPECT_THROW(make_partition(world(), mesh, model, equal_architecture(3), {}), InputError);
+}
+
+TEST_P(Partitions, TakeBodiesThatDoNotHangTogether) {
+  test::BoxMeshOptions options;
+  options.dim = GetParam();
+  options.cells = {8, 8, GetParam() == 2 ? 0 : 4};
+  MeshPiece piece = test::box_piece(world(), options);
+  const GlobalId stride = 1000000;  // the elements right of the middle get nodes of their own
+  MeshPiece parted = piece;
+  parted.node_numbers.clear();
+  parted.coordinates.clear();
+  parted.element_nodes.clear();
+  parted.facet_nodes.clear();
+  parted.facet_group.clear();
+  std::map<GlobalId, LocalId> places;
+  const auto dim = static_cast<std::size_t>(piece.dim);
+  for (std::size_t e = 0; e < piece.element_region.size(); ++e) {
+    Real x = 0;
+    for (std::size_t i = 0; i <= dim; ++i) {
+      x += piece.coordinates[static_cast<std::size_t>(piece.element_nodes[e * (dim + 1) + i]) * dim];
+    }
+    for (std::size_t i = 0; i <= dim; ++i) {
+      const auto node = static_cast<std::size_t>(piece.element_nodes[e * (dim + 1) + i]);
+      const bool is_right = x / static_cast<Real>(dim + 1) > 0.5;
+      const GlobalId number = piece.node_numbers[node] + (is_right ? stride : 0);
+      const auto [place, is_new] = places.try_emplace(number, static_cast<LocalId>(places.size()));
+      if (is_new) {
+        parted.node_numbers.push_back(number);
+        const Real* point = piece.coordinates.data() + node * dim;
+        parted.coordinates.insert(parted.coordinates.end(), point, point + dim);
+      }
+      parted.element_nodes.push_back(place->second);
+    }
+  }
+  const Mesh mesh = assemble_mesh(world(), parted).mesh;
+  const PartitionPlan two = make_partition(world(), mesh, {}, equal_architecture(2), {});
+  EXPECT_EQ(two.after.cut, 0);
+  EXPECT_NEAR(two.after.imbalance, 0, 1e-9);
+  const PartitionPlan five = make_partition(world(), mesh, {}, equal_architecture(5), {});
+  EXPECT_LE(five.after.imbalance, 0.1);  // parts wholly in one body would make it 0.25
+  EXPECT_EQ(five.after.empty_parts, 0);
+}
+
+TEST_P(Partitions, BordersMoveInside) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  const Architecture machine = equal_architecture(4);
+  const PartitionPlan plan = make_partition(world(), mesh, {}, machine, {});
+  const std::vector<Real> work(static_cast<std::size_t>(mesh.elements()), 1);
+  ReleaseOptions options;
+  options.balanced = false;
+  ReleaseReport report;
+  const std::vector<int> shifted = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options, &report);
+  expect_parts(mesh, shifted, 4);
+  EXPECT_GT(report.interface_nodes, 0);
+  EXPECT_LE(report.still, report.interface_nodes / 5);
+  options.balanced = true;
+  move_interfaces_inside(world(), mesh, work, machine, plan.parts, options, &report);
+  EXPECT_LE(report.imbalance, 0.1);
+  EXPECT_LE(report.still, report.interface_nodes / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Dimensions, Partitions, testing::Values(2, 3));
+
+TEST(PartitionCosts, AreThoseCountedByHand) {
+  test::BoxMeshOptions options;  // two cells of two triangles: one part each
+  options.dim = 2;
+  options.cells = {2, 1, 0};
+  const Mesh mesh = test::box_mesh(world(), options);
+  WorkModel model;
+  model.element = 1;
+  model.node = 10;
+  model.communication = 2;
+  Architecture machine = equal_architecture(2);
+  machine.speed = {1, 2};
+  machine.bandwidth = 4;
+  std::vector<int> parts;
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    Real x = 0;
+    for (const LocalId node : mesh.nodes_of_element(e)) x += mesh.point(node)[0] / 3;
+    parts.push_back(x > 0.5 ? 1 : 0);
+  }
+  const WorkGraph graph = build_work_graph(world(), mesh, element_work(world(), mesh, model));
+  const PartitionCost cost = partition_cost(world(), mesh, graph, model, machine, parts);
+  // 4 elements and 6 nodes: 64 of work, speed 3. The two middle nodes are split; both go to the faster part.
+  EXPECT_DOUBLE_EQ(cost.ideal_time, 64.0 / 3);
+  EXPECT_EQ(cost.cut, 1);
+  EXPECT_EQ(cost.communication_volume, 2);
+  EXPECT_EQ(cost.interface_nodes, 2);
+  EXPECT_EQ(cost.max_neighbours, 1);
+  EXPECT_EQ(cost.empty_parts, 0);
+  EXPECT_EQ(cost.stray_pieces, 0);
+  // Edges between {0, 3} and the four others: two along x and one of the diagonals.
+  EXPECT_EQ(cost.cut_edges, 3);
+  EXPECT_DOUBLE_EQ(cost.times[0], (22 + 2 * 4 / 4.0) / cost.ideal_time);
+  EXPECT_DOUBLE_EQ(cost.times[1], (42 / 2.0 + 2 * 4 / 4.0) / cost.ideal_time);
+  EXPECT_DOUBLE_EQ(cost.cost, std::max(cost.times[0], cost.times[1]));
+}
+
+}  // namespace
+}  // namespace malleus
