@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "mesh/curve_partition.hpp"
 #include "mesh/space_filling_curve.hpp"
@@ -9,13 +10,30 @@
 namespace malleus {
 namespace {
 
-std::vector<std::uint64_t> centroid_keys(const Communicator& comm, const Mesh& mesh) {
-  const Box box = bounding_box(comm, mesh.coordinates, mesh.dim);
+/// Turns a point by angles that grow with the variant; 0 leaves it.
+void turn(Real* point, int dim, int variant) {
+  constexpr std::array<Real, 2> angles = {0.6, 0.45};  // rad
+  for (int axis = 0; axis + 1 < dim && variant > 0; ++axis) {
+    const Real c = std::cos(angles[static_cast<std::size_t>(axis)] * variant);
+    const Real s = std::sin(angles[static_cast<std::size_t>(axis)] * variant);
+    const Real a = point[axis];
+    const Real b = point[axis + 1];
+    point[axis] = c * a - s * b;
+    point[axis + 1] = s * a + c * b;
+  }
+}
+
+std::vector<std::uint64_t> centroid_keys(const Communicator& comm, const Mesh& mesh, int variant = 0) {
+  std::vector<Real> turned = mesh.coordinates;
+  for (LocalId node = 0; node < mesh.nodes(); ++node)
+    turn(turned.data() + static_cast<std::ptrdiff_t>(node) * mesh.dim, mesh.dim, variant);
+  const Box box = bounding_box(comm, turned, mesh.dim);
   std::vector<std::uint64_t> keys(static_cast<std::size_t>(mesh.elements()));
   for (LocalId e = 0; e < mesh.elements(); ++e) {
     std::array<Real, 3> centroid = {0, 0, 0};
     for (const LocalId node : mesh.nodes_of_element(e)) {
-      for (int c = 0; c < mesh.dim; ++c) centroid[static_cast<std::size_t>(c)] += mesh.point(node)[c] / (mesh.dim + 1);
+      const Real* point = turned.data() + static_cast<std::ptrdiff_t>(node) * mesh.dim;
+      for (int c = 0; c < mesh.dim; ++c) centroid[static_cast<std::size_t>(c)] += point[c] / (mesh.dim + 1);
     }
     keys[static_cast<std::size_t>(e)] = hilbert_key(centroid.data(), mesh.dim, box);
   }
@@ -25,8 +43,8 @@ std::vector<std::uint64_t> centroid_keys(const Communicator& comm, const Mesh& m
 }  // namespace
 
 MigrationReport divide_along_curve(const Communicator& comm, Mesh& mesh, FieldStore& fields,
-                                   std::span<const GlobalId> weights, int ranks) {
-  std::vector<int> destinations = curve_partition(comm, centroid_keys(comm, mesh), weights);
+                                   std::span<const GlobalId> weights, int ranks, int variant) {
+  std::vector<int> destinations = curve_partition(comm, centroid_keys(comm, mesh, variant), weights);
   for (int& rank : destinations) rank = static_cast<int>(static_cast<GlobalId>(rank) * ranks / comm.size());
   return migrate(comm, mesh, fields, destinations);
 }

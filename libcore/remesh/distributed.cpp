@@ -3,6 +3,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 
@@ -61,7 +62,7 @@ class DistributedRemesher {
     report_.phases.push_back({name, seconds});
   }
 
-  /// Divides the mesh among the first ranks by what each element will become.
+  /// Divides the mesh among the first ranks by what each element will become, each time along other cuts.
   void spread(const Metric& wanted, int ranks) {
     if (comm_.size() == 1) return;
     // What an element costs even if it is only looked at or taken away, in elements to be made.
@@ -71,22 +72,49 @@ class DistributedRemesher {
     std::vector<GlobalId> weights;
     for (const Real count : predicted)
       weights.push_back(static_cast<GlobalId>(std::clamp(scale * (count + own_cost), 1.0, 1e12)));
-    const MigrationReport moved = divide_along_curve(comm_, mesh_, fields_, weights, ranks);
+    const MigrationReport moved =
+        divide_along_curve(comm_, mesh_, fields_, weights, ranks, static_cast<int>(report_.rounds.size()));
     moved_ += moved.moved_elements;
     sent_ += moved.sent_bytes;
   }
 
-  /// A mesh too small for all ranks grows at most eightfold on those that have enough to do.
+  /// A mesh too small for all ranks grows first on those that have enough to do; and where interfaces are far too
+  /// coarse, what is beside them would come out in bad shape: then all is refined by as much in several steps.
   bool refine_in_stage() {
-    constexpr Real growth = 8;
+    constexpr Real largest_growth = 12;
+    if (comm_.size() == 1) return false;
     const GlobalId ranks = std::clamp<GlobalId>(mesh_.total_elements / options_.fewest_elements, 1, comm_.size());
-    const Metric wanted = metric();
-    const Real predicted = predicted_elements(comm_, mesh_, wanted);
-    if (ranks == comm_.size() || predicted <= growth * static_cast<Real>(mesh_.total_elements)) return false;
-    const Real factor = std::pow(predicted / (growth * static_cast<Real>(mesh_.total_elements)), 1.0 / mesh_.dim);
-    timed("balance", [&] { spread(wanted, static_cast<int>(ranks)); });
-    remesh_coarser(factor);
+    const Real growth = ranks < comm_.size() ? growth_of_all() : growth_at_interfaces();
+    const Real stages = std::ceil(std::log(std::max(growth, 1.0)) / std::log(largest_growth));
+    if (stages <= 1) return false;
+    timed("balance", [&] { spread(metric(), static_cast<int>(ranks)); });
+    remesh_coarser(std::pow(growth, (1 - 1 / stages) / mesh_.dim));
     return true;
+  }
+
+  /// Elements to make for each one there is.
+  Real growth_of_all() const {
+    return predicted_elements(comm_, mesh_, metric()) / static_cast<Real>(std::max<GlobalId>(1, mesh_.total_elements));
+  }
+  Real growth_at_interfaces() const {
+    const std::vector<Real> predicted = predicted_elements_of_each(local_arrays(mesh_), metric());
+    const std::vector<std::uint8_t> shared = shared_nodes(mesh_);
+    std::array<Real, 2> sums = {0, 0};
+    for (LocalId e = 0; e < mesh_.elements(); ++e) {
+      const auto nodes = mesh_.nodes_of_element(e);
+      if (std::none_of(nodes.begin(), nodes.end(), [&](LocalId node) { return shared[index(node)] != 0; })) continue;
+      sums[0] += predicted[index(e)];
+      sums[1] += 1;
+    }
+    comm_.sum_in_place(sums);
+    return sums[1] > 0 ? sums[0] / sums[1] : 1;
+  }
+
+  void leave_interfaces(const std::vector<std::uint8_t>& marks, int round) {
+    const MigrationReport moved =
+        migrate(comm_, mesh_, fields_, move_interfaces(comm_, mesh_, marks, options_.moved_layers, round));
+    moved_ += moved.moved_elements;
+    sent_ += moved.sent_bytes;
   }
 
   /// Remeshes with sizes that are larger than wanted by up to a factor, but no larger than now.
@@ -177,10 +205,7 @@ class DistributedRemesher {
     for (int round = 0; round < options_.strip_rounds && comm_.any(is_any(marks)); ++round) {
       timed("move interfaces", [&] {
         set_marks(marks);
-        const MigrationReport moved =
-            migrate(comm_, mesh_, fields_, move_interfaces(comm_, mesh_, marks, options_.moved_layers, round));
-        moved_ += moved.moved_elements;
-        sent_ += moved.sent_bytes;
+        leave_interfaces(marks, round);
       });
       timed("remesh strips", [&] { marks = remesh_strip(); });
     }

@@ -17,8 +17,8 @@ namespace malleus {
 struct DistributedRemeshOptions {
   RemeshOptions local;                         ///< of each rank's remeshes
   int strip_rounds = 5;                        ///< at most, to remesh what interfaces held
-  int moved_layers = 4;                        ///< how many elements far an interface moves
-  int strip_layers = 3;                        ///< elements remeshed again on each side of a former interface
+  int moved_layers = 6;                        ///< how many elements far an interface moves
+  int strip_layers = 4;                        ///< elements remeshed again on each side of a former interface
   GlobalId fewest_elements = 2000;             ///< a rank takes part once there are that many for it
   std::vector<char> kept_regions;              ///< [region] 1: its elements stay as they are; may be empty
   std::function<void(const char*)> announces;  ///< told each phase as it begins, on all ranks; may be empty
