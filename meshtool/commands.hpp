@@ -23,6 +23,7 @@ std::span<const Command> commands();
 int run_info(const Communicator& comm, const std::vector<std::string>& arguments);
 int run_check(const Communicator& comm, const std::vector<std::string>& arguments);
 int run_partition(const Communicator& comm, const std::vector<std::string>& arguments);
+int run_probe(const Communicator& comm, const std::vector<std::string>& arguments);
 int run_convert(const Communicator& comm, const std::vector<std::string>& arguments);
 int run_refine(const Communicator& comm, const std::vector<std::string>& arguments);
 

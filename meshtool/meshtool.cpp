@@ -55,6 +55,7 @@ std::span<const Command> commands() {
       Command{"convert", "writes a mesh, or meshes a CAD file, in another format", run_convert},
       Command{"refine", "brings a mesh to other sizes: finer, coarser, graded, anisotropic", run_refine},
       Command{"partition", "divides a mesh among equal or unequal processors", run_partition},
+      Command{"probe", "measures the processors and links of this machine", run_probe},
   };
   return list;
 }

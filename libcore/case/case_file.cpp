@@ -56,6 +56,16 @@ bool is_name(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), is_name_letter);
 }
 
+/// A name, or names joined by dots as in `link.0-1`.
+bool is_key(std::string_view text) {
+  while (true) {
+    const std::size_t dot = text.find('.');
+    if (!is_name(text.substr(0, dot))) return false;
+    if (dot == std::string_view::npos) return true;
+    text.remove_prefix(dot + 1);
+  }
+}
+
 /// Readable form of what was found, for messages.
 std::string shown(std::string_view text) {
   constexpr std::size_t longest = 60;
@@ -187,7 +197,7 @@ void CaseFile::parse_line(std::string_view line, const Place& place) {
   }
   const std::size_t equals = line.find('=');
   const std::string key(trim(line.substr(0, equals)));
-  if (equals == std::string_view::npos || !is_name(key)) {
+  if (equals == std::string_view::npos || !is_key(key)) {
     mistakes_.add(place, fmt::format("expected 'key = value' or '[section]', found '{}'", shown(line)));
     return;
   }

@@ -70,8 +70,13 @@ class Planner {
     } else {
       const Candidate present = {{from.begin(), from.end()}, "as it was", cost_of(from), 0};
       plan.before = present.cost;
-      best = repaired(present);
-      if (best.cost.cost >= present.cost.cost) best = present;
+      best = options_.method == Partitioner::refined ? repaired(present) : present;
+      if (options_.method == Partitioner::curve) {
+        best = along_curve();
+        best.moved = moved_work(from, best.parts);
+      } else if (best.cost.cost >= present.cost.cost) {
+        best = present;
+      }
     }
     plan.parts = std::move(best.parts);
     plan.after = std::move(best.cost);
