@@ -13,6 +13,10 @@ namespace {
 constexpr Real spent_speed = 1e-3;
 /// Largest relative change of the speed in a step of a hammer.
 constexpr Real speed_change = 0.1;
+/// A hydraulic press slower than this share of its full speed is not asked to meet its limit in more plans than so
+/// many.
+constexpr Real crawling = 1e-3;
+constexpr int most_bracketed = 8;
 
 }  // namespace
 
@@ -27,6 +31,13 @@ Real StrokeTable::position(Real time) const {
 Press::Press(PressSpec spec) : spec_(std::move(spec)) {
   if (has_inertia()) state_.speed = std::sqrt(2 * spec_.energy / spec_.mass);
   if (spec_.kind == PressKind::hydraulic) state_.allowed_speed = std::numeric_limits<Real>::max();
+}
+
+void Press::restore(const PressState& state) {
+  state_ = state;
+  slow_.reset();
+  fast_.reset();
+  bracketed_ = 0;
 }
 
 /// Height of the ram above the bottom dead centre at the angle a from it: r (1 - cos a) + l - sqrt(l^2 - r^2 sin^2 a).
@@ -88,31 +99,49 @@ Real Press::travel(Real time, const Displacement& displacement) const {
 
 bool Press::accepts(Real force, Real time, Real tolerance) {
   if (spec_.kind != PressKind::hydraulic) return true;
+  const Real full = spec_.speed(time);
   const Real speed_now = speed(time);
-  const bool is_limited = state_.allowed_speed < spec_.speed(time);
+  const bool is_limited = state_.allowed_speed < full;
   if (!is_limited && force <= spec_.force_limit * (1 + tolerance)) return true;
   if (is_limited && std::abs(force - spec_.force_limit) <= tolerance * spec_.force_limit) return true;
-  if (!(force > 0)) {  // nothing resists: full speed
-    state_.allowed_speed = std::numeric_limits<Real>::max();
-    has_trial_ = false;
-    return !is_limited;
-  }
-  Real exponent = 0.3;  // d ln F / d ln w, of a usual material until two speeds were tried
-  if (has_trial_ && trial_speed_ != speed_now && trial_force_ > 0) {
-    exponent = std::clamp(std::log(force / trial_force_) / std::log(speed_now / trial_speed_), 0.02, 2.0);
-  }
-  trial_force_ = force;
-  trial_speed_ = speed_now;
-  has_trial_ = true;
-  const Real factor = std::pow(spec_.force_limit / force, 1 / exponent);
-  state_.allowed_speed = speed_now * std::clamp(factor, 1e-3, 1e3);
+  if (!(speed_now > 0) && force > spec_.force_limit) return true;  // it stands still: what it holds is not its doing
+  if (bracketed_ > most_bracketed && speed_now < crawling * full) return true;  // solves are not that sharp
+  (force > spec_.force_limit ? fast_ : slow_) = {speed_now, force};
+  state_.allowed_speed = next_speed(full);
   return false;
+}
+
+/// The next speed to try: by the power law through what was tried, kept within the bracket where there is one.
+Real Press::next_speed(Real full) {
+  constexpr Real creeping = 1e-7;  // of the full speed: below it the press stands still
+  constexpr Real usual_exponent = 0.3;
+  const Real limit = spec_.force_limit;
+  if (slow_ && fast_) {
+    const Real width = fast_->speed - slow_->speed;
+    const Real linear = slow_->speed + width * (limit - slow_->force) / (fast_->force - slow_->force);
+    Real guess = linear;
+    if (slow_->speed > 0 && slow_->force > 0) {
+      const Real exponent = std::log(fast_->force / slow_->force) / std::log(fast_->speed / slow_->speed);
+      if (exponent > 0) guess = slow_->speed * std::pow(limit / slow_->force, 1 / exponent);
+    }
+    if (++bracketed_ % 4 == 0) guess = slow_->speed + 0.5 * width;  // one side may be stuck
+    return std::clamp(guess, slow_->speed + 0.02 * width, fast_->speed - 0.02 * width);
+  }
+  if (fast_) {
+    const Real less = fast_->speed * std::clamp(std::pow(limit / fast_->force, 1 / usual_exponent), 1e-3, 0.9);
+    return less > creeping * full ? less : 0;
+  }
+  if (!(slow_->force > 0)) return std::numeric_limits<Real>::max();  // nothing resists: full speed
+  const Real from = std::max(slow_->speed, creeping * full);
+  return from * std::clamp(std::pow(limit / slow_->force, 1 / usual_exponent), 1.1, 1e3);
 }
 
 void Press::commit(Real force, Real time, const Displacement& displacement) {
   const Real way = travel(time, displacement);
   state_.stroke += way;
-  has_trial_ = false;
+  slow_.reset();
+  fast_.reset();
+  bracketed_ = 0;
   if (!has_inertia()) {
     state_.last_speed = speed(time);
     state_.speed = state_.last_speed;

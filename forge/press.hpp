@@ -3,6 +3,7 @@
 /// What drives a tool along its direction: one ordinary differential equation on a scalar, the stroke.
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "forge/time_scheme.hpp"
@@ -50,7 +51,7 @@ class Press {
 
   const PressSpec& spec() const noexcept { return spec_; }
   const PressState& state() const noexcept { return state_; }
-  void restore(const PressState& state) { state_ = state; }
+  void restore(const PressState& state);
 
   /// The speed at `time` [m/s], under which the tool's velocity enters friction and the first guess.
   Real speed(Real time) const;
@@ -58,8 +59,8 @@ class Press {
   /// the scheme of the nodes.
   Real travel(Real time, const Displacement& displacement) const;
   /// Hydraulic: whether the force [N] that resists the planned motion agrees with the press to `tolerance` (relative);
-  /// else the speed is changed (secant in the logarithms of force and speed) and the increment has to be solved
-  /// again. Other presses take any force.
+  /// else the speed is changed (by a power law between force and speed, within a bracket) and the increment has to be
+  /// solved again. A press that stands still accepts any force. Other presses take any force.
   bool accepts(Real force, Real time, Real tolerance);
   /// Ends an increment. force: what resists the motion, N. Hammer and screw: m dw/dt = -force, by the nodes' scheme.
   void commit(Real force, Real time, const Displacement& displacement);
@@ -68,13 +69,19 @@ class Press {
 
  private:
   bool has_inertia() const noexcept { return spec_.kind == PressKind::hammer || spec_.kind == PressKind::screw; }
+  Real next_speed(Real full);
   Real crank_drop(Real time) const;  ///< stroke of a crank since time 0
 
   PressSpec spec_;
   PressState state_;
-  Real trial_force_ = 0;  ///< hydraulic: of the last refused plan
-  Real trial_speed_ = 0;
-  bool has_trial_ = false;
+  /// Hydraulic: a plan of this increment that was refused.
+  struct Trial {
+    Real speed = 0;
+    Real force = 0;
+  };
+  std::optional<Trial> slow_;  ///< the last with too small a force
+  std::optional<Trial> fast_;  ///< the last with too large a one
+  int bracketed_ = 0;          ///< plans between the two
 };
 
 }  // namespace malleus::forge

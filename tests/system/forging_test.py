@@ -419,6 +419,56 @@ class SurfaceTools(Forging):
             self.assertIn("tool.msh: the file has no lines", result.stderr)
 
 
+class Revolved(Forging):
+    """Axisymmetric scenes: x is the radius, y the axis; forces are those of the whole revolution."""
+
+    def scene(self, m, tool, time, size=(1.0, 1.0), cells=(8, 8)):
+        box_mesh(self.directory / "box.msh", 2, size=size, cells=cells)
+        return ("[case]\ngeometry = axisymmetric\n" +
+                f"[mesh]\nfile = box.msh\n[time]\n{time}\n[body.billet]\ngroup = billet\nconsistency = {K!r}\n"
+                f"rate_sensitivity = {m}\n[tool.upper]\n{tool}"
+                "[tool.lower]\nshape = plane\npoint = 0 0\nnormal = 0 1\n")
+
+    PLANE = "shape = plane\npoint = 0 1\nnormal = 0 -1\nvelocity = 0 -1\n"
+
+    def test_a_plane_upsets_a_disc(self):
+        for m in (1, 0.3):
+            rows = self.forge(self.scene(m, self.PLANE, "increments = 3\nstep = 0.01"),
+                              "-D", "solver.cutoff_strain_rate=1e-6")
+            for i, row in enumerate(rows):
+                height = 1 - 0.01 * i
+                force = math.pi / height * math.sqrt(3) * K * (math.sqrt(3) / height) ** m
+                self.assertAlmostEqual(row["force_upper_y_N"] / force, 1, delta=2e-3)
+                self.assertAlmostEqual(row["volume_m3"] / math.pi, 1, delta=1e-4)
+
+    def test_a_container_stops_the_flow_outward(self):
+        container = "[tool.wall]\nshape = cylinder\nmaterial = inside\npoint = 0 0\naxis = 0 1\nradius = 1.05\n"
+        rows = self.forge(self.scene(0.3, self.PLANE, "stroke = 0.08\nstep = 0.01") + container)
+        # free until R = 1.05, at H = 1/1.05^2 = 0.907: a plain disc before, no pressure on the wall
+        first = [row for row in rows if row["stroke_upper_m"] < 0.07]
+        self.assertTrue(all(row["force_wall_x_N"] == 0 for row in first))
+        rows = self.forge(self.scene(0.3, self.PLANE, "stroke = 0.092\nstep = 0.01") + container)
+        free = math.pi / 0.908 * math.sqrt(3) * K * (math.sqrt(3) / 0.908) ** 0.3
+        self.assertAlmostEqual(rows[-1]["force_upper_y_N"] / free, 1, delta=0.05)
+
+    def test_a_sphere_presses_a_disc_as_in_three_dimensions(self):
+        tool = "shape = sphere\npoint = 0 3\nradius = 2\nvelocity = 0 -1\nfriction = 1e3\n"
+        rows = self.forge(self.scene(1, tool, "increments = 6\nstep = 0.01", cells=(12, 12)))
+        mesh = BoxMesh(3)
+        mesh.add("billet", [0.0] * 3, [1.0] * 3, (8, 8, 8))
+        # The quarter of a cylinder: squares become discs.
+        mesh.points = [[x * math.sqrt(1 - y * y / 2), y * math.sqrt(1 - x * x / 2), z] for x, y, z in mesh.points]
+        mesh.write(self.directory / "box.msh")
+        text = (f"[mesh]\nfile = box.msh\n[time]\nincrements = 6\nstep = 0.01\n[body.billet]\ngroup = billet\n"
+                f"consistency = {K!r}\nrate_sensitivity = 1\n"
+                "[boundary.x]\ngroup = billet_x_low\ntype = symmetry\n[boundary.y]\ngroup = billet_y_low\ntype = symmetry\n"
+                "[tool.upper]\nshape = sphere\npoint = 0 0 3\nradius = 2\nvelocity = 0 0 -1\nfriction = 1e3\n"
+                "[tool.lower]\nshape = plane\npoint = 0 0 0\nnormal = 0 0 1\n")
+        solid = self.forge(text, ranks=2, name="solid")
+        self.assertGreater(rows[-1]["force_upper_y_N"], 2 * rows[0]["force_upper_y_N"])
+        self.assertAlmostEqual(4 * solid[-1]["force_upper_z_N"] / rows[-1]["force_upper_y_N"], 1, delta=0.1)
+
+
 class Presses(Forging):
     """Frictionless upsetting in plane strain, height 1, volume 1: F = (1/H) 2 K (2 w/H)^m."""
 
@@ -452,6 +502,68 @@ class Presses(Forging):
             last = row["stroke_upper_m"]
         self.assertAlmostEqual(work / energy, 1, delta=0.03)
         self.assertLess(rows[-1]["time_s"], 10)
+
+    def test_the_crank_follows_its_rod(self):
+        # height of the ram over its lowest position: r (1 - cos a) + l - sqrt(l^2 - r^2 sin^2 a), a before it
+        r, l, rate = 0.2, 0.5, 2.0
+
+        def height(angle):
+            return r * (1 - math.cos(angle)) + l - math.sqrt(l * l - (r * math.sin(angle)) ** 2)
+
+        angle = math.radians(70)
+        end = 1.2 * angle / rate  # past the lowest position
+        rows = self.press(f"press = crank\ncrank_radius = {r}\nrod_length = {l}\nrotation_speed = {rate}\n"
+                          f"start_height = {height(angle)!r}", f"end = {end!r}\nstep = 0.03")
+        for row in rows:
+            stroke = height(angle) - height(angle - rate * row["time_s"])
+            self.assertAlmostEqual(row["stroke_upper_m"], stroke, delta=1e-9)
+            going_down = rate * (row["time_s"] - row["dt_s"]) < angle
+            start = angle - rate * (row["time_s"] - row["dt_s"])
+            left = 1 - (height(angle) - height(start))
+            speed = rate * (height(start + 1e-6) - height(start - 1e-6)) / 2e-6
+            if going_down and rate * row["time_s"] < angle:  # F = 2 K (2 w/H)^m / H
+                self.assertAlmostEqual(row["force_upper_y_N"] / (2 * K * (2 * speed / left) ** 0.5 / left), 1, delta=0.03)
+        self.assertEqual(rows[-1]["force_upper_y_N"], 0)  # going up it has left the material
+
+    def test_the_screw_press_spends_its_energy(self):
+        mass, speed = 1e8, 0.5
+        energy = 0.5 * mass * speed**2
+        rows = self.press(f"press = screw\nenergy = {energy}\nmass = {mass}", "end = 10\nstep = 0.01")
+        work, last = 0.0, 0.0
+        for row in rows:
+            work += row["force_upper_y_N"] * (row["stroke_upper_m"] - last)
+            last = row["stroke_upper_m"]
+        self.assertAlmostEqual(work / energy, 1, delta=0.03)
+        self.assertIn("came to rest", summary(self.directory / "out")["reason"])
+
+    def test_the_hydraulic_press_stalls_where_nothing_yields(self):
+        # The block has no way out: the press keeps its force, and the stroke is what the penalty gives.
+        limit = 1e8
+        box_mesh(self.directory / "box.msh", 2, cells=(4, 4))
+        text = case_text(0.5, 2, 1, "tools", time="end = 0.1\nstep = 0.02")
+        text = text.replace("normal = 0 -1.0", f"normal = 0 -1.0\npress = hydraulic\nforce_limit = {limit}")
+        text += "[boundary.wall]\ngroup = billet_x_high\ntype = symmetry\n"
+        rows = self.forge(text, "-D", "solver.newton_tolerance=1e-7", "-D", "solver.linear_tolerance=1e-9")
+        for row in rows:
+            self.assertAlmostEqual(row["force_upper_y_N"] / limit, 1, delta=2e-3)
+        self.assertLess(rows[-1]["stroke_upper_m"], 1e-3)
+        self.assertGreaterEqual(rows[-1]["stroke_upper_m"], 0)
+
+    def test_a_container_turns_the_material_with_it(self):
+        box_mesh(self.directory / "box.msh", 2, cells=(6, 6))
+        text = case_text(0.3, 2, 1, "tools", time="end = 0.1\nstep = 0.005")
+        text = text[:text.index("[boundary")] + (
+            "[tool.box]\nshape = box\nmaterial = inside\npoint = 0.5 0.5\nsize = 1 1\nspin = 1\npivot = 0.5 0.5\n"
+            "[probe.corner]\npoint = 0.9 0.5\nmoves = with-material\nfields = equivalent_strain\n")
+        for ranks in (1, 2):
+            rows = self.forge(text, ranks=ranks)
+            with open(self.directory / "out" / "probe-corner.csv") as file:
+                last = file.read().splitlines()[-1].split(",")
+            x, y = float(last[2]) - 0.5, float(last[3]) - 0.5
+            self.assertAlmostEqual(math.hypot(x, y), 0.4, delta=1e-3)
+            self.assertAlmostEqual(math.atan2(y, x), 0.1, delta=1e-3)
+            self.assertLess(float(last[-1]), 5e-3)
+            self.assertLess(abs(rows[-1]["volume_change"]), 1e-3)
 
     def test_a_table_moves_the_tool(self):
         (self.directory / "stroke.csv").write_text("time,position\n0,0\n0.1,0.02\n0.2,0.1\n")
