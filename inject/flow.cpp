@@ -8,9 +8,9 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
-#include "fem/level_set_volume.hpp"
 #include "fem/pressure_extension.hpp"
 #include "mesh/space_filling_curve.hpp"
+#include "solvers/level_set_speed.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -260,30 +260,14 @@ void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::
 void Flow::note_freezing(std::span<const Real> old_velocity) {
   if (fronts_.size() == 0 || state_.seconds_since_flow == 0) return;
   const std::span<const Real> velocity = scene_.fields["velocity"].values();
-  Real largest = 0;  // change of the front's speed over the local size, 1/s
-  with_dim(scene_.mesh.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (std::size_t i = 0; i < fronts_.size(); ++i) {
-      const std::span<const Real> level_set = fronts_.values(i);
-      for (const LocalId e : cut_elements(scene_.mesh, level_set)) {
-        const auto p1 = p1_gradients<D>(simplex_points<D>(scene_.mesh, e));
-        Point<D> slope = Point<D>::Zero();
-        Point<D> change = Point<D>::Zero();
-        for (int k = 0; k <= D; ++k) {
-          const auto node = static_cast<std::size_t>(scene_.mesh.nodes_of_element(e)[static_cast<std::size_t>(k)]);
-          slope += level_set[node] * p1.gradients.col(k);
-          for (int c = 0; c < D; ++c) {
-            const auto at = node * D + static_cast<std::size_t>(c);
-            change[c] += (velocity[at] - old_velocity[at]) / (D + 1);
-          }
-        }
-        if (!(slope.norm() > 0)) continue;
-        const Real size = std::pow(p1.volume * (D == 2 ? 2.31 : 8.49), 1.0 / D);  // edge of the regular simplex
-        largest = std::max(largest, std::abs(change.dot(slope.normalized())) / size);
-      }
-    }
-  });
-  freezing_error_ += 0.5 * state_.seconds_since_flow * scene_.comm.max(largest);
+  std::vector<Real> change(velocity.begin(), velocity.end());
+  for (std::size_t i = 0; i < change.size(); ++i) change[i] -= old_velocity[i];
+  Real largest = 0;
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    const std::span<const Real> level_set = std::as_const(fronts_).values(i);
+    largest = std::max(largest, front_crossing_rate(scene_.comm, scene_.mesh, scene_.node_sizes, change, level_set));
+  }
+  freezing_error_ += 0.5 * state_.seconds_since_flow * largest;
 }
 
 nlohmann::json Flow::save() const {

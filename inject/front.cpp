@@ -11,6 +11,7 @@
 #include "fem/level_set_volume.hpp"
 #include "solvers/level_set_pockets.hpp"
 #include "solvers/level_set_redistance.hpp"
+#include "solvers/level_set_speed.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -126,6 +127,16 @@ Real Front::rate() {
   return rate;
 }
 
+Real Front::crossing_rate() const {
+  Real rate = 0;
+  const std::span<const Real> velocity = scene_.fields["velocity"].values();
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    const std::span<const Real> level_set = std::as_const(fronts_).values(i);
+    rate = std::max(rate, front_crossing_rate(scene_.comm, scene_.mesh, scene_.node_sizes, velocity, level_set));
+  }
+  return rate;
+}
+
 Outcome Front::advance(const Increment& increment) {
   snapshot();
   substeps_ = 0;
@@ -138,12 +149,13 @@ Outcome Front::advance(const Increment& increment) {
     const int parts = static_cast<int>(std::clamp(wanted, 1.0, 1e6));
     const Real dt = left / parts;
     if (renew_velocity_) renew_velocity_(start + 0.5 * dt);
+    const Real crossed = dt * crossing_rate();
     const Outcome outcome = substep(start, dt);
     if (outcome.kind != Outcome::Kind::done) {
       roll_back();
       return outcome;
     }
-    state_.travelled += dt * fastest;
+    state_.travelled += crossed;
     ++substeps_;
     left = parts == 1 ? 0 : left - dt;
   }

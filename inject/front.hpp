@@ -32,8 +32,10 @@ class Front final : public Component {
   /// After the mesh and the fields were replaced. Collective.
   void rebuild();
 
-  /// Elements a second that the front crosses at the present flow. Collective.
+  /// Elements a second through which the fluid at the front flows, at the fastest place: limits substeps. Collective.
   Real rate();
+  /// Elements a second that the front as a whole moves on at the present flow: what the flow follows. Collective.
+  Real crossing_rate() const;
   int substeps() const { return substeps_; }                   ///< of the last increment
   GlobalId redistances() const { return redistances_; }        ///< since the start
   GlobalId pockets_filled() const { return pockets_filled_; }  ///< too small for the mesh; since the start

@@ -8,6 +8,7 @@
 
 #include "base/log.hpp"
 #include "fem/error_norms.hpp"
+#include "inject/forecast.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -51,6 +52,7 @@ void FillingProcess::add_prescribed_flow() {
 }
 
 void FillingProcess::add_front() {
+  way_ = way_of_fronts(scene_, fronts_);
   std::function<void(Real)> renew;
   if (prescribed_) renew = [this](Real time) { prescribed_->evaluate(time); };
   front_ = std::make_unique<Front>(scene_, fronts_, state_, std::move(renew));
@@ -86,19 +88,8 @@ std::vector<std::string> FillingProcess::accuracy_settings() const {
   return lines;
 }
 
-/// From measured constants of one core: a Stokes solve 30 us a node, a substep of the front 2 us a node.
 Forecast FillingProcess::forecast() const {
-  const auto nodes = static_cast<Real>(scene_.mesh.total_nodes());
-  const auto ranks = static_cast<Real>(scene_.comm.size());
-  const Real across =
-      std::pow(static_cast<Real>(std::max<GlobalId>(1, scene_.mesh.total_elements)), 1.0 / scene_.mesh.dim);
-  const bool is_stepping = has_fronts() && scene_.settings.time.increments != 0;
-  Forecast forecast;
-  forecast.increments = is_stepping ? static_cast<GlobalId>(2 * across) : 0;
-  const Real solves = is_stepping ? static_cast<Real>(forecast.increments) : 1;
-  forecast.wall_s = nodes / ranks * (30e-6 * solves + (is_stepping ? 2e-6 * solves / scene_.settings.front.cfl : 0));
-  forecast.memory_bytes = 60e6 * ranks + nodes * (flow_ ? 3000 : 1200);
-  return forecast;
+  return forecast_filling(scene_, way_, stride(), flow_ != nullptr, mixture_->is_linear());
 }
 
 std::vector<std::string> FillingProcess::output_fields() const {
@@ -108,19 +99,28 @@ std::vector<std::string> FillingProcess::output_fields() const {
   return names;
 }
 
-/// The front crosses as many elements as the flow may lag behind; and no more comes in than there is room for.
+/// Elements that the front crosses in an increment: as many as the flow may lag behind.
+Real FillingProcess::stride() const {
+  const FlowSettings& flow = scene_.settings.flow;
+  if (flow_ && flow.update.kind == FlowUpdate::Kind::every) return scene_.settings.front.cfl;
+  if (flow_ && flow.update.kind == FlowUpdate::Kind::automatic) {
+    return std::max(flow.update_distance, scene_.settings.front.cfl);
+  }
+  return frozen_stride;
+}
+
+/// No more comes in than there is room for.
 Real FillingProcess::largest_step() {
   if (!has_fronts()) return unlimited;
-  const FlowSettings& flow = scene_.settings.flow;
-  Real stride = frozen_stride;
-  if (flow_ && flow.update.kind == FlowUpdate::Kind::every) stride = scene_.settings.front.cfl;
-  if (flow_ && flow.update.kind == FlowUpdate::Kind::automatic) {
-    stride = std::max(flow.update_distance, scene_.settings.front.cfl);
-    // A vent that closes changes the flow at once.
-    if (fronts_.is_near_open_vent(stride * scene_.element_size)) stride = scene_.settings.front.cfl;
+  const Real cfl = scene_.settings.front.cfl;
+  Real elements = stride();
+  const bool follows_front = flow_ && scene_.settings.flow.update.kind == FlowUpdate::Kind::automatic;
+  // A vent that closes changes the flow at once.
+  if (follows_front && fronts_.is_near_open_vent(elements * scene_.element_size)) {
+    elements = std::max(elements / 2, cfl);
   }
-  const Real rate = front_->rate();
-  Real dt = rate > 0 ? stride / rate : unlimited;
+  const Real rate = flow_ ? front_->crossing_rate() : front_->rate();
+  Real dt = rate > 0 ? elements / rate : unlimited;
   const Real inflow = state_.inflow();
   if (inflow > 0 && filling_->unfilled() > 0) dt = std::min(dt, filling_->unfilled() / inflow);
   return dt;

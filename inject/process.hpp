@@ -51,6 +51,7 @@ class FillingProcess final : public Process {
  private:
   nlohmann::json known_errors();
   std::vector<std::string> error_columns() const;
+  Real stride() const;
 
   Scene scene_;
   FrontSet fronts_;
@@ -63,6 +64,7 @@ class FillingProcess final : public Process {
   std::unique_ptr<Probes> probes_;
   std::vector<Component*> order_;
   ThinSections thin_;
+  Real way_ = 0;  ///< that the fronts had before them at the start, m
 };
 
 /// The thickest fluid's viscosity over the thinnest that is modelled as it is given.

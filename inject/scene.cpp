@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "fem/level_set_volume.hpp"
+#include "solvers/level_set_speed.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -109,6 +110,7 @@ void Scene::rebuild() {
   const Real mean = comm.sum(std::accumulate(flat.begin(), flat.end(), 0.0)) /
                     static_cast<Real>(std::max<GlobalId>(1, mesh.total_elements));
   element_size = mesh.dim == 2 ? std::sqrt(4 / std::sqrt(3.0) * mean) : std::cbrt(6 * std::sqrt(2.0) * mean);
+  node_sizes = malleus::node_sizes(mesh);
   parts = named_parts(settings);
   for (BoundaryPart& part : parts) part.group = mesh.find_group(group_of(settings, part));
   const std::vector<int> part_of_group = parts_of_groups(mesh, parts);

@@ -43,9 +43,10 @@ struct Scene {
   Geometry geometry;
 
   NodeGraph graph;
-  std::vector<Real> measures;  ///< volume of each element, m^3
-  Real cavity = 0;             ///< volume of all, m^3
-  Real element_size = 0;       ///< edge of a regular element of mean volume, m
+  std::vector<Real> measures;    ///< volume of each element, m^3
+  Real cavity = 0;               ///< volume of all, m^3
+  Real element_size = 0;         ///< edge of a regular element of mean volume, m
+  std::vector<Real> node_sizes;  ///< [node] of the mesh around it, m
   std::vector<BoundaryPart> parts;
 
   std::vector<const BoundaryPart*> parts_of(BoundaryPart::Kind kind) const;

@@ -344,9 +344,9 @@ void Engine::finish(const std::string& status, int code) {
   for (const std::string& line : process_.closing_lines()) log::info("{}", line);
   const Forecast forecast = process_.forecast();
   if (code == exit_code::done && last_.number > 0) {
-    log::info("took {:.1f} s and {:.0f} MiB; the forecast was {:.1f} s and {:.0f} MiB", wall_s(),
-              static_cast<Real>(comm_.sum(peak_memory_bytes())) / 1048576, forecast.wall_s,
-              forecast.memory_bytes / 1048576);
+    log::info("took {} increments, {:.1f} s and {:.0f} MiB; the forecast was {}, {:.1f} s and {:.0f} MiB", last_.number,
+              wall_s(), static_cast<Real>(comm_.sum(peak_memory_bytes())) / 1048576, forecast.increments,
+              forecast.wall_s, forecast.memory_bytes / 1048576);
   }
   log::info("{} ({}): results in {}", status, end_reason_.empty() ? "solved" : end_reason_,
             settings_.directory.string());
@@ -371,6 +371,14 @@ void Engine::write_summary(const std::string& status, int code) {
   summary["reason"] = end_reason_;
   summary["increments"] = last_.number;
   summary["wall_s"] = wall_s();
+  const Forecast forecast = process_.forecast();
+  const auto ratio = [](Real taken, Real expected) {
+    return expected > 0 ? nlohmann::json(taken / expected) : nullptr;
+  };
+  summary["forecast"]["taken_over_expected"] = {
+      {"increments", ratio(static_cast<Real>(last_.number), static_cast<Real>(forecast.increments))},
+      {"wall_s", ratio(wall_s(), forecast.wall_s)},
+      {"memory_bytes", ratio(summary["peak_memory_bytes"], forecast.memory_bytes)}};
   nlohmann::json final_row = nlohmann::json::object();
   for (std::size_t i = 0; i < history_->last_row().size(); ++i) {
     const HistoryCell& cell = history_->last_row()[i];

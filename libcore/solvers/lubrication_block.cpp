@@ -38,9 +38,9 @@ class Builder {
     mesh_.node_halo.add_to_owners(std::span(load), 1);
     load.resize(index(mesh_.owned_nodes()));
     constexpr Real tolerance = 1e-2;
-    constexpr int most = 30;
-    mobility_ =
-        ScalarMultigrid(*system_.comm, blocks_.layout, blocks_.graph, std::move(values)).solve(load, tolerance, most);
+    constexpr int most = 200;  // the walls are near where it matters
+    const ScalarMatrix speed{*system_.comm, blocks_.layout, blocks_.graph, std::move(values)};
+    mobility_ = solve_conjugate_gradients(speed, load, tolerance, most);
     for (Real& value : mobility_) value = std::max(value, 0.0);
     mobility_.resize(index(mesh_.nodes()));
     mesh_.node_halo.update_copies(std::span(mobility_), 1);
@@ -219,14 +219,16 @@ std::unique_ptr<LubricationBlock> LubricationBlock::make_where_thin(const Border
   if (!builder.find_mobility()) return nullptr;
   std::unique_ptr<LubricationBlock> block(new LubricationBlock);
   block->comm_ = op.system().comm;
-  block->solver_ = std::make_unique<ScalarMultigrid>(*block->comm_, blocks.layout, blocks.graph, builder.assemble());
+  const ScalarMatrix matrix{*block->comm_, blocks.layout, blocks.graph, builder.assemble()};
+  block->cycle_ = make_scalar_multigrid(matrix);
+  const auto precondition = [&](const Real* residual, Real* correction) { block->cycle_->apply(residual, correction); };
   const auto borders = static_cast<Eigen::Index>(op.borders());
   Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(borders, borders);
   for (Eigen::Index j = 0; j < borders; ++j) {
     const std::vector<Real>& exchange = builder.border_columns()[static_cast<std::size_t>(j)];
     constexpr Real tolerance = 1e-6;
     constexpr int most = 60;
-    block->columns_.push_back(block->solver_->solve(exchange, tolerance, most));
+    block->columns_.push_back(solve_conjugate_gradients(matrix, exchange, precondition, tolerance, most));
     const Real total = block->comm_->sum(std::accumulate(exchange.begin(), exchange.end(), 0.0));
     schur(j, j) += total - op.system().borders[static_cast<std::size_t>(j)].diagonal;
     for (Eigen::Index i = 0; i < borders; ++i) {
@@ -237,13 +239,12 @@ std::unique_ptr<LubricationBlock> LubricationBlock::make_where_thin(const Border
   }
   block->border_inverse_ = symmetric_pseudo_inverse(schur, true);
   block->corrected_.resize(index(blocks.graph.rows()));
-  block->solver_->forget_matrix();
   return block;
 }
 
 void LubricationBlock::add(const Real* residual, std::span<const Real> border_residual, Real factor,
                            std::vector<float>& correction, Eigen::VectorXd& border_correction) {
-  solver_->apply(residual, corrected_.data());
+  cycle_->apply(residual, corrected_.data());
   std::vector<Real> sums(columns_.size());
   for (std::size_t j = 0; j < columns_.size(); ++j) {
     sums[j] = std::inner_product(columns_[j].begin(), columns_[j].end(), residual, 0.0);
@@ -260,7 +261,7 @@ void LubricationBlock::add(const Real* residual, std::span<const Real> border_re
 }
 
 std::size_t LubricationBlock::bytes() const {
-  return solver_->bytes() + sizeof(Real) * (corrected_.size() + columns_.size() * corrected_.size());
+  return cycle_->bytes() + sizeof(Real) * (corrected_.size() + columns_.size() * corrected_.size());
 }
 
 }  // namespace malleus

@@ -39,7 +39,7 @@ class LubricationBlock {
   LubricationBlock() = default;
 
   const Communicator* comm_ = nullptr;
-  std::unique_ptr<ScalarMultigrid> solver_;
+  std::unique_ptr<VelocityMultigrid> cycle_;
   std::vector<std::vector<Real>> columns_;  ///< [border][owned node]: pressures that a unit q makes
   Eigen::MatrixXd border_inverse_;
   std::vector<Real> corrected_;

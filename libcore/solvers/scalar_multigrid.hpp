@@ -1,41 +1,40 @@
 #pragma once
 
-/// Scalar elliptic problems between the pressures of the nodes: a multigrid cycle, and conjugate gradients around it.
+/// Scalar elliptic problems between the pressures of the nodes: conjugate gradients, and a multigrid cycle.
 
+#include <functional>
 #include <memory>
 
 #include "solvers/multigrid/velocity_multigrid.hpp"
 
 namespace malleus {
 
-/// A symmetric matrix with an entry for each of a graph's, positive definite on the rows whose diagonal is not zero.
-/// Layout, graph and communicator must outlive it.
-class ScalarMultigrid {
- public:
-  /// values: [entry]. Rows and columns with a zero diagonal are left out and get no correction. Collective.
-  ScalarMultigrid(const Communicator& comm, const BlockLayout& layout, const BlockGraph& graph,
-                  std::vector<Real> values);
+/// A symmetric matrix with an entry for each of a graph's, positive definite on the rows whose diagonal is not zero;
+/// those with a zero diagonal are left out, and so are their columns. Communicator, layout and graph must outlive it.
+struct ScalarMatrix {
+  const Communicator& comm;
+  const BlockLayout& layout;
+  const BlockGraph& graph;
+  std::vector<Real> values;  ///< [entry]
 
-  /// One symmetric cycle in single precision, from zero. [owned node]. Collective among neighbours.
-  void apply(const Real* residual, Real* correction) { cycle_->apply(residual, correction); }
-
-  /// Conjugate gradients from zero to ||b - A x|| <= tolerance ||b||, or to the best of `most` iterations. With an
-  /// approximate x the energy b.x is below the exact one. [owned node]. Collective.
-  std::vector<Real> solve(const std::vector<Real>& b, Real tolerance, int most) const;
-
-  std::size_t bytes() const { return cycle_->bytes() + sizeof(Real) * values_.size(); }
-  /// Gives up the matrix; apply() remains. Local.
-  void forget_matrix() { values_ = {}; }
-
- private:
-  void multiply(std::vector<Real>& x, std::vector<Real>& y) const;
-  Real dot(const std::vector<Real>& a, const std::vector<Real>& b) const;
-
-  const Communicator& comm_;
-  const BlockLayout& layout_;
-  const BlockGraph& graph_;
-  std::vector<Real> values_;
-  std::unique_ptr<VelocityMultigrid> cycle_;
+  Real diagonal(LocalId row) const {
+    return values[static_cast<std::size_t>(graph.diagonals[static_cast<std::size_t>(row)])];
+  }
 };
+
+/// correction from residual, symmetric and positive; [owned node].
+using ScalarPreconditioner = std::function<void(const Real* residual, Real* correction)>;
+
+/// Conjugate gradients from zero to ||b - A x|| <= tolerance ||b||, or as far as `most` iterations reach; x.b is then
+/// below its exact value. b: [owned node], zero where a row is left out. Collective.
+std::vector<Real> solve_conjugate_gradients(const ScalarMatrix& matrix, const std::vector<Real>& b,
+                                            const ScalarPreconditioner& precondition, Real tolerance, int most);
+
+/// The same with the inverse diagonal for preconditioner. Collective.
+std::vector<Real> solve_conjugate_gradients(const ScalarMatrix& matrix, const std::vector<Real>& b, Real tolerance,
+                                            int most);
+
+/// A multigrid of symmetric cycles in single precision for the matrix, which is not needed after. Collective.
+std::unique_ptr<VelocityMultigrid> make_scalar_multigrid(const ScalarMatrix& matrix);
 
 }  // namespace malleus

@@ -4,6 +4,8 @@
 #include "solvers/facet_distance.hpp"
 #include "solvers/level_set_pockets.hpp"
 #include "solvers/level_set_redistance.hpp"
+#include "solvers/level_set_speed.hpp"
+#include "solvers/level_set_transport.hpp"
 #include "solvers/level_set_wetting.hpp"
 
 namespace malleus {
@@ -39,6 +41,42 @@ TEST(FacetDistance, ToASingleSegmentAndTriangleIsExactEverywhere) {
       EXPECT_NEAR(distance[static_cast<std::size_t>(n)], exact, 1e-14);
     }
   }
+}
+
+TEST(CrossingRate, IsTheNormalSpeedOverTheSizeOfTheMesh) {
+  for (const int dim : {2, 3}) {
+    const int cells = 8;
+    const Mesh mesh = test::box_mesh(world(), {.dim = dim, .cells = {cells, cells, cells}});
+    const auto level_set = at_nodes(mesh, [](const Position& x) { return 0.53 - x[0]; });
+    std::vector<Real> velocity(static_cast<std::size_t>(mesh.nodes()) * static_cast<std::size_t>(dim), 7);
+    for (std::size_t i = 0; i < velocity.size(); i += static_cast<std::size_t>(dim)) velocity[i] = 3;
+    // Edge of the regular simplex of an element's volume: h^2/2, h^3/6.
+    const Real edge = (dim == 2 ? std::sqrt(2 / std::sqrt(3.0)) : std::cbrt(std::sqrt(2.0))) / cells;
+    EXPECT_NEAR(front_crossing_rate(world(), mesh, node_sizes(mesh), velocity, level_set) * edge / 3, 1, 1e-9);
+    const std::vector<Real> nowhere(level_set.size(), 1);
+    EXPECT_EQ(front_crossing_rate(world(), mesh, node_sizes(mesh), velocity, nowhere), 0);
+  }
+}
+
+TEST(CrossingRate, IsNotRuledBySlivers) {
+  Mesh mesh = test::box_mesh(world(), {.dim = 2, .cells = {8, 8, 1}});
+  const NodeGraph graph = build_node_graph(mesh);
+  const auto level_set = at_nodes(mesh, [](const Position& x) { return 0.53 - x[0]; });
+  std::vector<Real> velocity(2 * static_cast<std::size_t>(mesh.nodes()), 0);
+  for (std::size_t i = 0; i < velocity.size(); i += 2) velocity[i] = 1;
+  const auto rates = [&] {
+    LevelSetTransport transport(world(), mesh, graph, {});
+    return std::pair(front_crossing_rate(world(), mesh, node_sizes(mesh), velocity, level_set),
+                     transport.front_rate(velocity, level_set));
+  };
+  const auto regular = rates();
+  for (LocalId node = 0; node < mesh.nodes(); ++node) {
+    Real* x = mesh.coordinates.data() + static_cast<std::size_t>(node) * 2;
+    if (std::abs(x[0] - 0.5) < 1e-9 && std::abs(x[1] - 0.5) < 1e-9) x[0] += 0.125 * (1 - 1e-5);
+  }
+  const auto flat = rates();
+  EXPECT_LT(flat.first, 1.5 * regular.first);
+  EXPECT_LT(flat.second, 2 * regular.second);
 }
 
 TEST(Redistance, MakesADistanceOfADistortedSphereAndKeepsItsVolume) {
