@@ -65,8 +65,9 @@ void add_options(CLI::App& app, PartitionCommand& c) {
   app.add_option("--parts-file", c.parts_file, "Writes a part number a line, in the order of the elements of IN")
       ->type_name("FILE.txt");
   app.add_option("--report", c.report, "Writes measures and times as JSON")->type_name("FILE.json");
-  app.add_option("--method", c.method, "refined (default), curve, or keep: the partition of --from as it is")
-      ->check(CLI::IsMember({"refined", "curve", "keep"}));
+  app.add_option("--method", c.method,
+                 "refined (default), curve, strips (the paper's algorithm), or keep: the partition of --from as it is")
+      ->check(CLI::IsMember({"refined", "curve", "strips", "keep"}));
   app.add_option("--release", c.release,
                  "With --from: moves the borders between the parts inside them, as a remesher wants; balanced, or "
                  "shifted by a layer whatever the loads")
@@ -242,8 +243,10 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
   if (!parse_options(comm, app, arguments)) return exit_code::done;
   refuse_unknown_ending(command.output);
   if (!command.release.empty() && command.from.empty()) throw InputError("command line: --release wants --from");
-  const std::map<std::string, Partitioner> methods = {
-      {"refined", Partitioner::refined}, {"curve", Partitioner::curve}, {"keep", Partitioner::keep}};
+  const std::map<std::string, Partitioner> methods = {{"refined", Partitioner::refined},
+                                                      {"curve", Partitioner::curve},
+                                                      {"strips", Partitioner::strips},
+                                                      {"keep", Partitioner::keep}};
   command.options.method = methods.at(command.method);
   if (command.method == "keep" && command.from.empty()) throw InputError("command line: --method keep wants --from");
   const Architecture architecture = command.architecture.empty()

@@ -1,5 +1,7 @@
 #include "partition/partition.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <numeric>
@@ -10,6 +12,7 @@
 #include "partition/bisect.hpp"
 #include "partition/multilevel.hpp"
 #include "partition/relabel.hpp"
+#include "partition/strip_migration.hpp"
 
 namespace malleus {
 namespace {
@@ -18,6 +21,8 @@ namespace {
 /// then move whole parts, and the borders that they leave are long.
 constexpr Real start_anew_from = 0.5;
 constexpr int levelling_rounds = 6;
+/// Mesh edges that are cut with a face between elements, measured on refined partitions of tetrahedral meshes.
+constexpr Real mesh_edges_per_face = 2.5;
 
 /// Wall time by phase; the largest over the ranks is asked for at the end.
 class PhaseClock {
@@ -65,18 +70,22 @@ class Planner {
     PartitionPlan plan;
     Candidate best;
     if (!has_start) {
-      best = options_.method == Partitioner::curve ? along_curve() : anew();
+      if (options_.method == Partitioner::refined) {
+        best = anew();
+      } else {
+        best = along_curve();
+        if (options_.method == Partitioner::strips) best = by_strips(best);
+      }
       plan.before = best.cost;
     } else {
       const Candidate present = {{from.begin(), from.end()}, "as it was", cost_of(from), 0};
       plan.before = present.cost;
-      best = options_.method == Partitioner::refined ? repaired(present) : present;
-      if (options_.method == Partitioner::curve) {
-        best = along_curve();
-        best.moved = moved_work(from, best.parts);
-      } else if (best.cost.cost >= present.cost.cost) {
-        best = present;
-      }
+      if (options_.method == Partitioner::keep) best = present;
+      if (options_.method == Partitioner::curve) best = along_curve();
+      if (options_.method == Partitioner::strips) best = by_strips(present);
+      if (options_.method == Partitioner::refined) best = repaired(present);
+      best.moved = moved_work(from, best.parts);
+      if (options_.method != Partitioner::curve && best.cost.cost >= present.cost.cost) best = present;
     }
     plan.parts = std::move(best.parts);
     plan.after = std::move(best.cost);
@@ -108,6 +117,16 @@ class Planner {
 
   Candidate along_curve() {
     Candidate candidate = {curve_parts(), "curve", {}, 0};
+    candidate.cost = cost_of(candidate.parts);
+    return candidate;
+  }
+
+  Candidate by_strips(const Candidate& present) {
+    StripOptions strips;
+    strips.edge_cost = model_.communication * (1 + mesh_edges_per_face) / graph_.unit;
+    StripReport report;
+    Candidate candidate = {migrate_strips(comm_, graph_, architecture_, present.parts, strips, report), "", {}, 0};
+    candidate.made_by = fmt::format("{} pairs of strips in {} iterations", report.pairs, report.iterations);
     candidate.cost = cost_of(candidate.parts);
     return candidate;
   }

@@ -14,6 +14,7 @@ namespace malleus {
 enum class Partitioner {
   refined,  ///< the best geometric start, refined; from a given partition what costs least, diffusion or anew
   curve,    ///< stretches of the space-filling curve, as they come
+  strips,   ///< the paper's migration of strips, from the given partition or the curve's
   keep,     ///< the given partition as it is, for its measures
 };
 

@@ -169,6 +169,34 @@ TEST_P(Partitions, TakeBodiesThatDoNotHangTogether) {
   EXPECT_EQ(five.after.empty_parts, 0);
 }
 
+TEST_P(Partitions, StripsLowerTheCostOfAnUnevenStart) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  std::vector<int> slabs;  // of widths 0.3, 1.1, 0.6
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    const Real x = mesh.point(mesh.nodes_of_element(e)[0])[0];
+    slabs.push_back(x < 0.3 ? 0 : x < 1.4 ? 1 : 2);
+  }
+  PartitionOptions options;
+  options.method = Partitioner::strips;
+  const PartitionPlan plan = make_partition(world(), mesh, {}, equal_architecture(3), options, slabs);
+  EXPECT_LT(plan.after.cost, plan.before.cost - 0.3);
+  EXPECT_LT(plan.after.imbalance, 0.25);  // whole strips: no nearer than half of one
+  EXPECT_GT(plan.moved, 0.1);
+  EXPECT_LT(plan.moved, 0.6);
+}
+
+TEST_P(Partitions, AGivenPartitionIsScoredAsItIs) {
+  const Mesh mesh = box(GetParam(), 4);
+  std::vector<int> slabs;
+  for (LocalId e = 0; e < mesh.elements(); ++e) slabs.push_back(mesh.point(mesh.nodes_of_element(e)[0])[0] < 1 ? 0 : 1);
+  PartitionOptions options;
+  options.method = Partitioner::keep;
+  const PartitionPlan plan = make_partition(world(), mesh, {}, equal_architecture(2), options, slabs);
+  EXPECT_EQ(plan.parts, slabs);
+  EXPECT_EQ(plan.after.cost, plan.before.cost);
+  EXPECT_EQ(plan.moved_elements, 0);
+}
+
 TEST_P(Partitions, BordersMoveInside) {
   const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
   const Architecture machine = equal_architecture(4);
