@@ -11,6 +11,7 @@ void InjectSimulator::describe(CaseReader& reader) {
 
 /// The coupled algorithm (paper, section 2.2.4), an increment after the other until the cavity is full:
 ///
+///   remeshing where [remesh] asks: a new mesh, fine about the front; the flow is solved again on it
 ///   flow      where the front has moved far enough since the last solve:
 ///               shares of the fluids in each element from the level sets, viscosity and density from the shares;
 ///               (v, p) of the Stokes equations with walls, gates, vents and symmetry; gates switch over
@@ -32,6 +33,7 @@ std::unique_ptr<Process> InjectSimulator::assemble(const Communicator& comm, Mes
     process->add_front();
     process->add_filling();
   }
+  process->add_remeshing();
   return process;
 }
 

@@ -74,6 +74,18 @@ void Front::rebuild() {
   open_ = open_nodes();
 }
 
+void Front::prepare_remesh() {
+  for (Real& time : scene_.fields["fill_time"].values()) time = time == not_filled ? state_.time : time;
+}
+
+void Front::finish_remesh() {
+  for (std::size_t i = 0; i < fronts_.size(); ++i)
+    restore_volume(scene_.comm, scene_.mesh, scene_.measures, fronts_.values(i), targets_[i]);
+  const std::vector<Real> filled = union_of_fronts();
+  const std::span<Real> fill_time = scene_.fields["fill_time"].values();
+  for (std::size_t n = 0; n < filled.size(); ++n) fill_time[n] = filled[n] > 0 ? fill_time[n] : not_filled;
+}
+
 /// Nodes of gates, vents and imposed flow: there air comes in or goes out.
 std::vector<char> Front::open_nodes() const {
   std::vector<char> open(static_cast<std::size_t>(scene_.mesh.nodes()), 0);

@@ -31,6 +31,10 @@ class Front final : public Component {
 
   /// After the mesh and the fields were replaced. Collective.
   void rebuild();
+  /// Before a remesh: fill_time goes on ahead of the fronts, so that interpolation finds no jump there.
+  void prepare_remesh();
+  /// After a remesh and rebuild(): fronts get their volumes back. Collective.
+  void finish_remesh();
 
   /// Elements a second through which the fluid at the front flows, at the fastest place: limits substeps. Collective.
   Real rate();

@@ -9,6 +9,7 @@
 #include "base/log.hpp"
 #include "fem/error_norms.hpp"
 #include "inject/forecast.hpp"
+#include "inject/front_sizes.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -41,6 +42,37 @@ FillingProcess::FillingProcess(const Communicator& comm, Mesh mesh, const Inject
   }
 }
 
+/// The scene must have its fields: call it after all other parts were added. It runs first.
+void FillingProcess::add_remeshing() {
+  const auto& settings = scene_.settings.common.remesh;
+  if (!settings || !settings->active) return;
+  RemeshedScene lent;
+  lent.comm = &scene_.comm;
+  lent.mesh = &scene_.mesh;
+  lent.fields = &scene_.fields;
+  lent.flow_field = "velocity";
+  lent.keep_volume = true;
+  if (front_) {
+    lent.before = [this] { front_->prepare_remesh(); };
+    lent.asks = [this](const Increment& /*any*/) { return front_left_fine_elements(scene_, fronts_); };
+    if (settings->min_size) lent.refine = [this](Metric& metric) { refine_at_fronts(scene_, fronts_, metric); };
+  }
+  lent.mesh_changed = [this] {
+    rebuild();
+    if (front_) front_->finish_remesh();
+  };
+  remeshing_ = std::make_unique<Remeshing>(*settings, std::move(lent));
+  order_.insert(order_.begin(), remeshing_.get());
+}
+
+/// Everything that stands on the mesh.
+void FillingProcess::rebuild() {
+  scene_.rebuild();
+  if (flow_) flow_->rebuild();
+  if (prescribed_) prescribed_->evaluate(state_.time);
+  if (front_) front_->rebuild();
+}
+
 void FillingProcess::add_flow() {
   flow_ = std::make_unique<Flow>(scene_, *mixture_, fronts_, state_);
   order_.push_back(flow_.get());
@@ -69,7 +101,8 @@ std::vector<LeftOut> FillingProcess::left_out() const {
   if (!scene_.settings.common.gravity) left.push_back({"weight", "no [gravity] section"});
   if (!has_fronts()) left.push_back({"front, mixture, filling", "one fluid"});
   if (prescribed_) left.push_back({"Stokes equations", "[flow] prescribes the velocity"});
-  left.push_back({"remeshing", "no [remesh] section"});
+  if (!remeshing_)
+    left.push_back({"remeshing", scene_.settings.common.remesh ? "[remesh] active = no" : "no [remesh] section"});
   return left;
 }
 
@@ -250,6 +283,7 @@ nlohmann::json FillingProcess::save_state() const {
                           {"seconds_since_flow", state_.seconds_since_flow}};
   if (flow_) state["flow"] = flow_->save();
   if (front_) state["front"] = front_->save();
+  if (remeshing_) state["remeshing"] = remeshing_->save();
   return state;
 }
 
@@ -284,6 +318,7 @@ void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::
     front_->rebuild();
     front_->load(state.at("front"));
   }
+  if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
 }
 
 }  // namespace malleus::inject

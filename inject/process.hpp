@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "engine/process.hpp"
+#include "engine/remeshing.hpp"
 #include "inject/filling.hpp"
 #include "inject/flow.hpp"
 #include "inject/front.hpp"
@@ -19,6 +20,7 @@ class FillingProcess final : public Process {
 
   /// @name Parts, for assemble()
   /// @{
+  void add_remeshing();
   void add_flow();
   void add_prescribed_flow();
   void add_front();
@@ -49,6 +51,7 @@ class FillingProcess final : public Process {
   Probes* probes() override { return probes_ ? probes_.get() : nullptr; }
 
  private:
+  void rebuild();
   nlohmann::json known_errors();
   std::vector<std::string> error_columns() const;
   Real stride() const;
@@ -57,6 +60,7 @@ class FillingProcess final : public Process {
   FrontSet fronts_;
   FillingState state_;
   std::unique_ptr<Mixture> mixture_;
+  std::unique_ptr<Remeshing> remeshing_;
   std::unique_ptr<Flow> flow_;
   std::unique_ptr<PrescribedFlow> prescribed_;
   std::unique_ptr<Front> front_;

@@ -314,7 +314,6 @@ void InjectCase::check(CaseReader& reader) const {
   };
   refuse(common.thermal.has_value(), "thermal", "inject models no heat yet; remove the section");
   refuse(common.inertia.has_value(), "inertia", "inject models no inertia yet; remove the section");
-  refuse(common.remesh.has_value() && common.remesh->active, "remesh", "inject does not remesh yet; set active = no");
   refuse(common.air.has_value(), "air", "inject does not compress trapped air yet; remove the section");
   if (front.transport == FrontSettings::Transport::trace) {
     reader.fail("front", "transport", "trace is not available yet; use crank-nicolson");

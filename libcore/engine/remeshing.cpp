@@ -100,6 +100,7 @@ Outcome Remeshing::remesh(const Increment& increment, const Metric& metric) {
   DistributedRemeshOptions options;
   options.local.keep_volume = scene_.keep_volume;
   options.kept_regions = scene_.kept_regions;
+  if (scene_.before) scene_.before();
   DistributedRemeshReport report;
   try {
     report = remesh_distributed(*scene_.comm, *scene_.mesh, *scene_.fields, metric, options);

@@ -24,6 +24,8 @@ struct RemeshedScene {
   std::function<void(Metric&)> refine;
   /// Whether the process wants a new mesh now, quality apart; may be empty. Collective.
   std::function<bool(const Increment&)> asks;
+  /// Readies the fields for their transfer; may be empty. Collective.
+  std::function<void()> before;
   /// Everything built on the mesh is to be built anew. Collective.
   std::function<void()> mesh_changed;
 };

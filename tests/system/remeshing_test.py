@@ -1,4 +1,5 @@
-"""[remesh] in runs: the mesh is made anew while a block is upset, and forces, volumes and restarts do not notice."""
+"""[remesh] in runs: the mesh is made anew while a block is upset and follows the front of a filling; forces, volumes and
+restarts do not notice."""
 import csv
 import os
 import pathlib
@@ -7,6 +8,8 @@ import tempfile
 import unittest
 
 import small_meshes
+from box_msh import BoxMesh
+from runs import history, run
 
 FORGE = pathlib.Path(os.environ["MALLEUS_BIN"]) / "forge"
 
@@ -93,6 +96,61 @@ class Remeshing(unittest.TestCase):
         for a, b in zip(whole, parts):
             self.assertEqual((a["nodes"], a["remeshed"]), (b["nodes"], b["remeshed"]))
             self.assertAlmostEqual(a["force_upper_y_N"] / b["force_upper_y_N"], 1, delta=1e-4)
+
+
+CHANNEL = """[mesh]
+file = channel.msh
+[time]
+end = 0.25 s
+[fluid.polymer]
+viscosity = 1000
+[fluid.air]
+viscosity = 0.1
+[initial]
+fluid = air
+[initial.start]
+fluid = polymer
+level_set = "0.004 - x"
+[inlet.gate]
+group = cavity_x_low
+fluid = polymer
+flow_rate = 8e-5
+[vent.outlet]
+group = cavity_x_high
+[wall.lower]
+group = cavity_y_low
+[wall.upper]
+group = cavity_y_high
+"""
+
+
+class FollowingTheFront(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def fill(self, name, across, remesh="", ranks=1):
+        mesh = BoxMesh(2)
+        mesh.add("cavity", [0.0, 0.0], [0.016, 0.004], [4 * across, across])
+        mesh.write(self.folder / "channel.msh")
+        case = self.folder / f"{name}.ini"
+        case.write_text(CHANNEL + remesh)
+        run("inject", case, self.folder / name, ranks=ranks)
+        return history(self.folder / name)
+
+    def test_a_fine_mesh_goes_with_the_front(self):
+        fine = self.fill("fine", 16)[-1]
+        for name, remesh, ranks in (("equal", "[remesh]\nsize = 0.5 mm\nmin_size = 0.25 mm\n", 1),
+                                    ("equal2", "[remesh]\nsize = 0.5 mm\nmin_size = 0.25 mm\n", 2),
+                                    ("stretched", "[remesh]\nsize = 0.5 mm\nmin_size = 0.2 mm\nanisotropic = yes\n", 1)):
+            with self.subTest(name=name):
+                rows = self.fill(name, 8, remesh, ranks)
+                self.assertGreater(len({row["nodes"] for row in rows}), 2)
+                self.assertLess(abs(rows[-1]["volume_error"]), 1e-10)
+                self.assertAlmostEqual(rows[-1]["injected_m3"] / fine["injected_m3"], 1, delta=1e-6)
+                self.assertAlmostEqual(rows[-1]["pressure_gate_Pa"] / fine["pressure_gate_Pa"], 1, delta=0.03)
+                self.assertLess(max(row["nodes"] for row in rows), fine["nodes"])
 
 
 if __name__ == "__main__":
