@@ -1,5 +1,6 @@
 #include "forge/assemble.hpp"
 
+#include "forge/earlier_state.hpp"
 #include "forge/forge_process.hpp"
 
 namespace malleus::forge {
@@ -18,8 +19,11 @@ namespace malleus::forge {
 /// in the list: see ForgeProcess::components().
 std::unique_ptr<Process> ForgeSimulator::assemble(const Communicator& comm, Mesh mesh, CaseReader& reader) {
   (void)reader;
+  std::optional<EarlierState> earlier;
+  if (case_.initial && !case_.initial->from.empty()) earlier = read_earlier_state(comm, mesh, case_.initial->from);
   auto scene = std::make_unique<Scene>();
-  build_scene(comm, std::move(mesh), case_, *scene);
+  build_scene(comm, earlier ? std::move(earlier->mesh) : std::move(mesh), case_, *scene);
+  if (earlier) take_over(*earlier, scene->fields);
   return std::make_unique<ForgeProcess>(case_, std::move(scene));
 }
 

@@ -154,7 +154,6 @@ void ForgeCase::validate(CaseReader& reader) const {
   refuse(common.thermal.has_value(), "thermal", "forge models no heat yet; remove the section");
   refuse(common.inertia.has_value(), "inertia", "forge models no inertia yet; remove the section");
   refuse(common.air.has_value(), "air", "forge models no trapped air; remove the section");
-  refuse(initial.has_value() && !initial->from.empty(), "initial", "forge does not start from another run yet");
   if (common.reference && common.reference->level_set) {
     reader.fail("reference", "level_set", "forge has no level set; remove the key");
   }

@@ -184,8 +184,7 @@ int Engine::run_increments() {
     }
     if (checkpoint_is_due()) write_checkpoint();
   }
-  const bool more_to_come = settings_.more_increments && end_reason_ == "--steps";
-  if (more_to_come && last_checkpoint_ != last_.number) write_checkpoint();
+  if (last_checkpoint_ != last_.number) write_checkpoint();  // --restart goes on from it, as may another case
   finish("done", exit_code::done);
   return exit_code::done;
 }

@@ -269,6 +269,42 @@ class Robustness(Forging):
         self.assertEqual(sum("the volume of the bodies has changed by" in text for text in warnings), 1)
 
 
+class Chained(Forging):
+    def test_two_operations_are_one(self):
+        # Half of the stroke, then the other half as a case of its own, on another number of ranks.
+        for dim in (2, 3):
+            with self.subTest(dim=dim):
+                box_mesh(self.directory / "box.msh", dim)
+                axis = dim - 1
+                column = f"force_upper_{'xyz'[axis]}_N"
+                text = case_text(0.3, dim, axis, "tools", time="increments = 8\nstep = 0.02")
+                text = text.replace("shape = plane\n", "shape = plane\nfriction = 0.5\n")
+                text += f"[probe.centre]\npoint = {' '.join(['0.45'] * dim)}\nfields = equivalent_strain\n"
+                whole = self.forge(text, name="whole")
+                strain = self.strain_at_the_probe("whole")
+                self.forge(text.replace("increments = 8", "increments = 4"), ranks=2, name="first")
+                second = text.replace("increments = 8", "increments = 4").replace(
+                    f"point = {vector(dim, axis, 1.0)}", f"point = {vector(dim, axis, 0.92)}")
+                rows = self.forge(second + "[initial]\nfrom = first\n", ranks=3, name="second")
+                self.assertEqual(rows[0]["increment"], 1)
+                self.assertAlmostEqual(rows[-1]["time_s"], 0.08, delta=1e-12)
+                self.assertAlmostEqual(rows[-1][column] / whole[-1][column], 1, delta=2e-3)
+                self.assertAlmostEqual(self.strain_at_the_probe("second") / strain, 1, delta=2e-2)
+
+    def strain_at_the_probe(self, name):
+        with open(self.directory / name / "probe-centre.csv") as file:
+            return float(file.read().splitlines()[-1].split(",")[-1])
+
+    def test_what_is_no_run_is_refused(self):
+        box_mesh(self.directory / "box.msh", 2)
+        (self.directory / "nothing").mkdir()
+        (self.directory / "case.ini").write_text(case_text(0.3, 2, 1, "tools") + "[initial]\nfrom = nothing\n")
+        for ranks in (1, 2):
+            result = run("forge", self.directory / "case.ini", self.directory / "out", ranks=ranks, check=False)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("there is no complete state of a run", result.stderr)
+
+
 class Contact(Forging):
     def blocks(self, dim, lower_cells, upper_cells, time="increments = 1\nstep = 1e-3", consistency=K):
         mesh = BoxMesh(dim)
