@@ -58,6 +58,7 @@ void Flow::rebuild() {
   operator_->leave_out_still_elements(true);
   linear_.reset();
   unknowns_ = {};
+  scene_.subscale_velocity.clear();
   is_solved_ = false;
 }
 
@@ -245,6 +246,7 @@ void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::
     viscosity[e] = operator_->viscosity()[e];
     strain_rate[e] = operator_->shear_rate()[e] / std::sqrt(3.0);
   }
+  scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
   for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
     GateState& gate = state_.gates[part->index];
     gate.drive = drives[part->index];
@@ -291,6 +293,7 @@ void Flow::load(const nlohmann::json& saved) {
   for (const GateState& gate : state_.gates) drives.push_back(gate.drive);
   prepare(drives, state_.time);
   operator_->update_viscosity(unknowns_);
+  scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
 }
 
 PrescribedFlow::PrescribedFlow(Scene& scene, FillingState& state) : scene_(scene), state_(state) {

@@ -132,6 +132,7 @@ std::vector<Real> Front::union_of_fronts() const {
 }
 
 Real Front::rate() {
+  transport_->set_subscales(scene_.subscale_velocity);
   Real rate = 0;
   for (std::size_t i = 0; i < fronts_.size(); ++i) {
     rate = std::max(rate, transport_->front_rate(scene_.fields["velocity"].values(), fronts_.values(i)));

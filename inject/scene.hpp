@@ -43,7 +43,9 @@ struct Scene {
   Geometry geometry;
 
   NodeGraph graph;
-  std::vector<Real> measures;    ///< volume of each element, m^3
+  std::vector<Real> measures;  ///< volume of each element, m^3
+  /// Of the last solved flow, [element][dim], m/s (see StokesOperator); empty where the flow is prescribed.
+  std::vector<Real> subscale_velocity;
   Real cavity = 0;               ///< volume of all, m^3
   Real element_size = 0;         ///< edge of a regular element of mean volume, m
   std::vector<Real> node_sizes;  ///< [node] of the mesh around it, m

@@ -3,8 +3,8 @@ COLUMNS = ["velocity L2", "velocity H1", "pressure L2"]
 ROWS = [{"setting": f"{name}, {n} elements along an edge", "case": case, "mesh": ["--dimension", str(dim), "--across", str(n)]}
         for name, case, dim, across in (("square", "case.ini", 2, (8, 16, 32, 64)),
                                         ("square, variable viscosity", "variable.ini", 2, (8, 16, 32, 64)),
-                                        ("cube", "cube.ini", 3, (4, 8, 16)),
-                                        ("cube, variable viscosity", "cube-variable.ini", 3, (4, 8, 16))) for n in across]
+                                        ("cube", "cube.ini", 3, (8, 16, 24)),
+                                        ("cube, variable viscosity", "cube-variable.ini", 3, (8, 16, 24))) for n in across]
 
 
 def measure(run, row):

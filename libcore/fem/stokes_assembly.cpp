@@ -175,8 +175,15 @@ ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& 
     }
   }
   comm_->sum_in_place(result.borders);
-  for (std::size_t g = 0; g < gates_.size(); ++g) result.borders[g] = scale * (result.borders[g] - gates_[g].flux);
   ResidualReport report;
+  Real largest_flux = 0;
+  for (std::size_t g = 0; g < gates_.size(); ++g) {
+    result.borders[g] -= gates_[g].flux;
+    report.gate_error = std::max(report.gate_error, std::abs(result.borders[g]));
+    largest_flux = std::max(largest_flux, std::abs(gates_[g].flux));
+    result.borders[g] *= scale;
+  }
+  report.gate_error = largest_flux > 0 ? report.gate_error / largest_flux : 0;
   report.net_flow = remove_net_flow(result);
   for (const Real value : result.nodes) squares[0] += value * value;
   comm_->sum_in_place(squares);
@@ -301,6 +308,21 @@ Real StokesOperator::dissipation(const StokesState& state) const {
     }
   });
   return comm_->sum(power);
+}
+
+std::vector<Real> StokesOperator::subscale_velocity(const StokesState& state) const {
+  std::vector<Real> result(static_cast<std::size_t>(mesh_->elements()) * static_cast<std::size_t>(mesh_->dim), 0.0);
+  with_dim(mesh_->dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < mesh_->elements(); ++e) {
+      const auto i = static_cast<std::size_t>(e);
+      if (!(viscosity_[i] > 0)) continue;
+      const MiniElement<D> element(simplex_points<D>(*mesh_, e));
+      Eigen::Map<Point<D>>(result.data() + i * D) =
+          element.subscale_velocity(gather<D>(*mesh_, e, state.nodes), element_load<MiniElement<D>>(e), viscosity_[i]);
+    }
+  });
+  return result;
 }
 
 WorstNode StokesOperator::worst_node(const LinearVector& residual) const {

@@ -52,6 +52,12 @@ ElementUnknowns<D> MiniElement<D>::load(const ElementLoad<D>& load, Real bubble_
 }
 
 template <int D>
+Point<D> MiniElement<D>::subscale_velocity(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load,
+                                           Real viscosity) const {
+  return subscale_ / (volume_ * viscosity) * (load.force.rowwise().mean() - gradients_ * unknowns.pressure);
+}
+
+template <int D>
 void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real viscosity, Real slope, Real scale,
                             ElementMatrix<D>& result) const {
   const Eigen::Matrix<Real, D, D + 1> stress_gradients = viscosity * volume_ * gradients_;

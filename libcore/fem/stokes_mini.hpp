@@ -65,6 +65,9 @@ class MiniElement {
   /// balance.
   ElementUnknowns<D> load(const ElementLoad<D>& load, Real bubble_viscosity) const;
 
+  /// Mean v' [m/s] of an element, T (f - grad p); for an axisymmetric scene that of the same section.
+  Point<D> subscale_velocity(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load, Real viscosity) const;
+
   /// Derivative of residual() with C frozen (else it were not symmetric): A of the viscosity, and
   /// slope 4 V (eps(v):eps(dv)) (eps(v):eps(w)); slope 0 gives Picard's matrix. Columns and rows of the pressure are
   /// multiplied by `scale`.

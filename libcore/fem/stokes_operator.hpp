@@ -42,9 +42,10 @@ struct FluxGate {
 
 /// Sizes against which residuals are judged; reduced over the ranks.
 struct ResidualReport {
-  Real norm = 0;       ///< of the scaled residual, borders included
-  Real reference = 0;  ///< of the forces that must balance: assembled internal forces or loads, N
-  Real internal = 0;   ///< of the assembled internal forces alone, N
+  Real norm = 0;        ///< of the scaled residual, borders included
+  Real reference = 0;   ///< of the forces that must balance: assembled internal forces or loads, N
+  Real internal = 0;    ///< of the assembled internal forces alone, N
+  Real gate_error = 0;  ///< largest difference of a gate's flux from the demanded one, over the largest demanded
   Real relative() const { return reference > 0 ? norm / reference : norm; }
   /// Where the pressure is free: the net flow that the prescribed velocities demand, less the volume targets. It has
   /// been spread over the domain as a uniform div v. m^3/s, outward; 0 elsewhere.
@@ -126,9 +127,12 @@ class StokesOperator {
   /// terms, zero at free nodes to the solver's tolerance. Exact: their power is that of the discrete solution.
   /// Collective.
   std::vector<Real> reactions(const StokesState& state);
-  /// Power dissipated by the viscous stress [W], that of the subscales (pressure times C times pressure) included: equal
-  /// to the power of loads and constraints. At the current viscosities. Collective.
+  /// Power dissipated by the viscous stress [W], that of the subscales (pressure times C times pressure) included:
+  /// equal to the power of loads and constraints. At the current viscosities. Collective.
   Real dissipation(const StokesState& state) const;
+  /// Mean velocity of each element's subscales (see MiniElement), [element][dim], m/s; zero where nothing is modelled.
+  /// What flows through an element is the velocity at its nodes and this. At the current viscosities. Local.
+  std::vector<Real> subscale_velocity(const StokesState& state) const;
   /// Of a result of residual(). Collective.
   WorstNode worst_node(const LinearVector& residual) const;
 

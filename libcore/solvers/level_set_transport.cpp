@@ -81,12 +81,22 @@ Real LevelSetTransport::front_rate(std::span<const Real> velocity, std::span<con
   return largest_front_rate(level_set);
 }
 
+/// A column a vertex.
+template <int D>
+Eigen::Matrix<Real, D, D + 1> LevelSetTransport::velocities_of(std::span<const Real> velocity, LocalId element) const {
+  Eigen::Matrix<Real, D, D + 1> velocities = nodal_vectors<D>(mesh_, velocity, element);
+  if (!subscales_.empty()) {
+    velocities.colwise() += Eigen::Map<const Point<D>>(subscales_.data() + static_cast<std::size_t>(element) * D);
+  }
+  return velocities;
+}
+
 void LevelSetTransport::compute_rates(std::span<const Real> velocity) {
   std::vector<Real> sums(2 * rates_.size(), 0);  // [node] volume times rate, volume
   with_dim(mesh_.dim, [&](auto d) {
     constexpr int D = decltype(d)::value;
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      const Point<D> mean = nodal_vectors<D>(mesh_, velocity, e).rowwise().mean();
+      const Point<D> mean = velocities_of<D>(velocity, e).rowwise().mean();
       const auto p1 = p1_gradients<D>(simplex_points<D>(mesh_, e));
       const Real crossed = p1.volume * streamline_rate<D>(p1, mean);
       for (const LocalId node : mesh_.nodes_of_element(e)) {
@@ -178,7 +188,7 @@ void LevelSetTransport::assemble(std::span<const Real> velocity, Real dt) {
     constexpr int n = (D + 1) * (D + 1);
     for (const LocalId e : active_elements_) {
       const auto p1 = p1_gradients<D>(simplex_points<D>(mesh_, e));
-      const auto element = transport_element<D>(p1, nodal_vectors<D>(mesh_, velocity, e), options_.stabilization, dt);
+      const auto element = transport_element<D>(p1, velocities_of<D>(velocity, e), options_.stabilization, dt);
       const std::int32_t* slot = slots_.slots.data() + static_cast<std::size_t>(e) * n;
       for (int i = 0; i <= D; ++i) {
         for (int j = 0; j <= D; ++j, ++slot) {

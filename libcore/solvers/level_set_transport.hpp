@@ -43,6 +43,10 @@ class LevelSetTransport {
   /// Mesh and graph must outlive this and not change. Local.
   LevelSetTransport(const Communicator& comm, const Mesh& mesh, const NodeGraph& graph, TransportOptions options);
 
+  /// Velocity [element][dim], m/s, that is added to the one at the nodes: what the flow's subscales carry. Empty: none.
+  /// Must stay as it is until the next call. Local.
+  void set_subscales(std::span<const Real> velocity) { subscales_ = velocity; }
+
   /// velocity: [node][dim] m/s; level_set: [node] m; both valid on copies, before and after. dt > 0 [s]. Collective.
   TransportReport advance(std::span<const Real> velocity, std::span<Real> level_set, Real dt,
                           const ImposedLevelSet& imposed);
@@ -66,6 +70,10 @@ class LevelSetTransport {
   const Mesh& mesh_;
   const NodeGraph& graph_;
   TransportOptions options_;
+  template <int D>
+  Eigen::Matrix<Real, D, D + 1> velocities_of(std::span<const Real> velocity, LocalId element) const;
+
+  std::span<const Real> subscales_;
   ElementSlots slots_;
   NodeMatrix left_;  ///< mass + dt/2 convection
   NodeMatrix convection_;

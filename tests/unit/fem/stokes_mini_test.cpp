@@ -191,6 +191,10 @@ TYPED_TEST(PlaneElement, SubscalesCarryWhatALayerLosesOfAChannelsFlow) {
   const Real viscosity = 3;
   ElementMatrix<D> matrix;
   TypeParam(points).matrix(Eigen::Matrix<Real, D, D + 1>::Zero(), viscosity, 0, 1, matrix);
+  ElementUnknowns<D> unknowns;
+  unknowns.pressure = points.row(0).transpose();
+  const Point<D> carried = TypeParam(points).subscale_velocity(unknowns, {}, viscosity);
+  EXPECT_LT((carried + height * height / (12 * viscosity) * Point<D>::Unit(0)).norm(), 1e-14);
   const Real share = geometry.volume * height * height / (12 * viscosity);
   for (int a = 0; a <= D; ++a) {
     for (int b = 0; b <= D; ++b) {
@@ -212,6 +216,7 @@ TYPED_TEST(PlaneElement, SubscalesRestInHydrostaticEquilibrium) {
   const TypeParam element(points);
   const auto balance = element.residual(unknowns, 2, 2).pressure - element.load(load, 2).pressure;
   EXPECT_LT(balance.norm(), 1e-14);
+  EXPECT_LT(element.subscale_velocity(unknowns, load, 2).norm(), 1e-14);
   EXPECT_GT(element.load(load, 2).pressure.norm(), 1e-4);
 }
 

@@ -57,6 +57,25 @@ TEST(Transport, TranslatesAPlaneExactlyAtAnyStep) {
   }
 }
 
+TEST(Transport, VelocityOfSubscalesAddsToThatOfTheNodes) {
+  for (const int dim : {2, 3}) {
+    const Mesh mesh = unit_mesh(dim, 6);
+    const NodeGraph graph = build_node_graph(mesh);
+    const auto shape = [](const Position& x) { return 0.3 - x[0] + 0.1 * x[1] * x[1]; };
+    const auto components = static_cast<std::size_t>(dim);
+    std::vector<Real> whole(static_cast<std::size_t>(mesh.nodes()) * components, 0.25);
+    const std::vector<Real> half(whole.size(), 0.125);
+    const std::vector<Real> subscales(static_cast<std::size_t>(mesh.elements()) * components, 0.125);
+    auto expected = at_nodes(mesh, shape);
+    auto level_set = expected;
+    LevelSetTransport(world(), mesh, graph, {}).advance(whole, expected, 0.4, {});
+    LevelSetTransport transport(world(), mesh, graph, {});
+    transport.set_subscales(subscales);
+    transport.advance(half, level_set, 0.4, {});
+    EXPECT_LT(largest_difference(mesh, level_set, expected), 1e-12);
+  }
+}
+
 TEST(Transport, LeavesTheLevelSetWhereNothingMoves) {
   const Mesh mesh = unit_mesh(3, 3);
   const NodeGraph graph = build_node_graph(mesh);
