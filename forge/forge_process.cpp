@@ -59,6 +59,7 @@ RemeshedScene ForgeProcess::remeshed_scene() {
   lent.mesh = &scene_->mesh;
   lent.fields = &scene_->fields;
   lent.flow_field = field_name::velocity;
+  lent.balances_by_cost = case_.common.partition.method == PartitionMethod::cost;
   lent.keep_volume = true;
   for (const Body& body : scene_->bodies) lent.kept_regions.push_back(body.is_deformable() ? 0 : 1);
   lent.mesh_changed = [this] { mesh_changed(); };

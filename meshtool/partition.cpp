@@ -166,6 +166,7 @@ nlohmann::json report_json(const PartitionPlan& plan, const MeshStatistics& mesh
   report["moved_elements"] = plan.moved_elements;
   report["made_by"] = plan.made_by;
   report["seconds"] = seconds;
+  report["processor_seconds"] = plan.processor_seconds;
   report["phases"] = plan.seconds;
   report["wall_s"] = wall;
   report["peak_memory_bytes"] = memory;

@@ -146,7 +146,7 @@ void LimitSettings::describe(Section& s) {
 void PartitionSettings::describe(Section& s) {
   s.choice("method", method,
            {{"curve", PartitionMethod::curve}, {"scotch", PartitionMethod::scotch}, {"cost", PartitionMethod::cost}},
-           "a space-filling curve, PT-Scotch, or least computing plus communication time");
+           "stretches of a space-filling curve, or least computing plus communication time (scotch is not built in)");
   s.choice("balance", balance, {{"counted", Balance::counted}, {"measured", Balance::measured}},
            "weights counted, or taken from measured times (then the bytes of two runs differ)");
 }

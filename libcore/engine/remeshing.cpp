@@ -100,6 +100,7 @@ Outcome Remeshing::remesh(const Increment& increment, const Metric& metric) {
   DistributedRemeshOptions options;
   options.local.keep_volume = scene_.keep_volume;
   options.kept_regions = scene_.kept_regions;
+  options.balances_by_cost = scene_.balances_by_cost;
   if (scene_.before) scene_.before();
   DistributedRemeshReport report;
   try {

@@ -19,6 +19,7 @@ struct RemeshedScene {
   FieldStore* fields = nullptr;
   std::string flow_field;          ///< node field by whose error `nodes` and `error` set sizes
   std::vector<char> kept_regions;  ///< [region] 1: no element of it changes; may be empty
+  bool balances_by_cost = false;   ///< [partition] method = cost
   bool keep_volume = false;        ///< restore each region's volume where a curved surface was resampled
   /// Makes the metric finer where the process wants it, within bounds that hold afterwards; may be empty. Collective.
   std::function<void(Metric&)> refine;

@@ -12,6 +12,7 @@
 #include "engine/engine.hpp"
 #include "engine/load_mesh.hpp"
 #include "engine/run_guarded.hpp"
+#include "partition/balance.hpp"
 
 namespace malleus {
 namespace {
@@ -105,6 +106,16 @@ void check_probe_fields(Process& process, const CommonSections& common, CaseRead
   }
 }
 
+/// What of [partition] is not there.
+void check_partition(const CommonSections& common, CaseReader& reader) {
+  if (common.partition.method == PartitionMethod::scotch) {
+    reader.fail("partition", "method", "scotch is not built in; cost and curve are");
+  }
+  if (common.partition.balance == Balance::measured) {
+    reader.fail("partition", "balance", "measured is not modelled yet; counted is");
+  }
+}
+
 int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
   CommonSections& common = simulator.common();
   common.case_settings.name = line.case_file.stem().string();
@@ -116,8 +127,12 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   if (common.case_settings.geometry == CaseGeometry::axisymmetric && mesh.dim == 3) {
     reader.fail("case", "geometry", "axisymmetric scenes want a mesh of two dimensions; this one has three");
   }
+  check_partition(common, reader);
   const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
   reader.check_mesh(names);
+  if (common.partition.method == PartitionMethod::cost && comm.size() > 1) {
+    log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, {}, true)));
+  }
   RunSettings settings = run_settings(line, simulator);
   const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
   check_output_fields(*process, common, reader);

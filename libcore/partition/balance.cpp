@@ -1,5 +1,7 @@
 #include "partition/balance.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,6 +57,25 @@ MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldS
   if (largest <= std::max(1.0, mean * (1 + tolerance))) return {};
   const std::vector<std::uint64_t> keys = centroid_keys(comm, mesh);
   return migrate(comm, mesh, fields, curve_partition(comm, keys, {}));
+}
+
+BalanceReport balance_by_cost(const Communicator& comm, Mesh& mesh, FieldStore& fields, const WorkModel& model,
+                              bool anew) {
+  const std::vector<int> here(static_cast<std::size_t>(mesh.elements()), comm.rank());
+  const Architecture ranks = equal_architecture(comm.size());
+  PartitionOptions options;
+  options.starts_anew = anew;
+  const PartitionPlan plan = make_partition(comm, mesh, model, ranks, options, here);
+  BalanceReport report = {plan.before.cost, plan.after.cost, plan.moved, plan.made_by, {}};
+  report.migration = migrate(comm, mesh, fields, plan.parts);
+  return report;
+}
+
+std::string describe_balance(const BalanceReport& report) {
+  return fmt::format(
+      "shares by {}: an increment is expected to take {:.3f} of the ideal instead of {:.3f}; {:.1f} % of "
+      "the work moved",
+      report.made_by, report.cost_after, report.cost_before, 100 * report.moved);
 }
 
 }  // namespace malleus

@@ -13,6 +13,8 @@ namespace {
 /// A graph of at most this many vertices, and so many a part, is refined by each rank for itself, all alike: rounds of
 /// pairs on small graphs are waiting more than work.
 constexpr GlobalId few_vertices = 60000;
+/// Of the bands: a third step from the border costs half as much time again and gains nothing that shows.
+constexpr int band_depth = 2;
 constexpr std::size_t most_levels = 30;
 constexpr Real least_shrinking = 0.95;
 
@@ -85,9 +87,9 @@ std::vector<int> refine_finest(const Communicator& comm, const WorkGraph& graph,
                                const MultilevelSettings& settings) {
   PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
   refiner.diffuse(0.9 * settings.tolerance, rounds);
-  refiner.smooth(settings.tolerance, {settings.fine_passes, 3, 2, 300});
+  refiner.smooth(settings.tolerance, {settings.fine_passes, band_depth, 2, 300});
   for (int sweep = 0; sweep < 3 && refiner.tidy(settings.tolerance); ++sweep) {
-    refiner.smooth(settings.tolerance, {1, 3, 1, 100});
+    refiner.smooth(settings.tolerance, {1, band_depth, 1, 100});
   }
   parts = std::move(refiner).take_parts();
   parts.resize(static_cast<std::size_t>(graph.owned()));
@@ -116,7 +118,7 @@ std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& gr
       parts = refine_replicated(comm, coarse, architecture, parts, targets, here);
     } else {
       parts = refine_level(comm, coarse, architecture, std::move(parts), targets, here.tolerance, is_coarsest,
-                           {settings.coarse_passes, 3, 2, 200});
+                           {settings.coarse_passes, band_depth, 2, 200});
     }
     const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
     std::vector<int> finer(coarse_of.size());

@@ -11,8 +11,8 @@ namespace malleus {
 struct MultilevelSettings {
   Real tolerance = 0.01;       ///< imbalance aimed at on the given graph; coarser ones have three times as much
   int vertices_per_part = 40;  ///< at which coarsening ends
-  int coarse_passes = 6;
-  int fine_passes = 3;
+  int coarse_passes = 4;
+  int fine_passes = 2;
 };
 
 /// Improves parts [owned vertex] towards targets [part]: neighbours of one part and rank are merged level by level; on

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <numeric>
 
 #include "base/error.hpp"
@@ -31,16 +32,22 @@ class PhaseClock {
     const auto now = std::chrono::steady_clock::now();
     seconds_[phase] += std::chrono::duration<Real>(now - start_).count();
     start_ = now;
+    const std::clock_t processor = std::clock();
+    if (phase != "evaluate") processor_ += static_cast<Real>(processor - processor_start_) / CLOCKS_PER_SEC;
+    processor_start_ = processor;
   }
   std::map<std::string, Real> largest(const Communicator& comm) const {
     std::map<std::string, Real> seconds;
     for (const auto& [phase, mine] : seconds_) seconds[phase] = comm.max(mine);
     return seconds;
   }
+  Real processor_seconds() const { return processor_; }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<std::string, Real> seconds_;
+  std::clock_t processor_start_ = std::clock();
+  Real processor_ = 0;
 };
 
 /// A partition on its way, with its name and cost.
@@ -93,6 +100,7 @@ class Planner {
     plan.moved = best.moved;
     if (has_start) plan.moved_elements = count_moved(from, plan.parts);
     plan.seconds = clock_.largest(comm_);
+    plan.processor_seconds = comm_.max(clock_.processor_seconds());
     return plan;
   }
 
@@ -178,6 +186,11 @@ class Planner {
 
   /// From the present partition by flows, or anew where that is predicted to be cheaper.
   Candidate repaired(const Candidate& present) {
+    if (options_.starts_anew) {
+      Candidate other = anew();
+      finish(present, other);
+      return other;
+    }
     Candidate best = {refine(present.parts), "flows and refinement", {}, 0};
     best.cost = cost_of(best.parts);
     finish(present, best);

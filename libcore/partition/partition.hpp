@@ -20,7 +20,8 @@ enum class Partitioner {
 
 struct PartitionOptions {
   Partitioner method = Partitioner::refined;
-  Real tolerance = 0.01;  ///< imbalance of the work aimed at
+  Real tolerance = 0.01;     ///< imbalance of the work aimed at
+  bool starts_anew = false;  ///< a given partition is compared with a new one, not repaired
   /// Cost of moving everything once, in increments, over the increments until the next repair: by it a plan that moves
   /// less is preferred to one that costs less per increment.
   Real moving_cost = 0.05;
@@ -35,6 +36,7 @@ struct PartitionPlan {
   GlobalId moved_elements = 0;          ///< over all ranks
   std::string made_by;                  ///< what was chosen, in words
   std::map<std::string, Real> seconds;  ///< wall time by phase, largest over the ranks
+  Real processor_seconds = 0;           ///< of the rank that used most, evaluation apart
 };
 
 /// Divides the elements of a mesh among the parts of an architecture, on any number of ranks; the mesh stays where it

@@ -37,7 +37,10 @@ class DistributedRemesher {
     timed("balance", [&] { spread(metric(), comm_.size()); });
     remesh_all(options_.local);
     remesh_strips();
-    timed("balance", [&] { balance_along_curve(comm_, mesh_, fields_); });
+    timed("balance", [&] {
+      balance_along_curve(comm_, mesh_, fields_);
+      if (options_.balances_by_cost) balance_by_cost(comm_, mesh_, fields_, {}, false);
+    });
     timed("report", [&] { report_.after = metric_fit(comm_, mesh_, metric()); });
     if (fields_.has(metric_field_name)) fields_.remove(metric_field_name);
     finish();

@@ -21,6 +21,7 @@ struct DistributedRemeshOptions {
   int strip_layers = 4;                        ///< elements remeshed again on each side of a former interface
   GlobalId fewest_elements = 2000;             ///< a rank takes part once there are that many for it
   std::vector<char> kept_regions;              ///< [region] 1: its elements stay as they are; may be empty
+  bool balances_by_cost = false;               ///< shares by balance_by_cost() at the end, not along the curve
   std::function<void(const char*)> announces;  ///< told each phase as it begins, on all ranks; may be empty
 };
 

@@ -68,6 +68,22 @@ TEST_P(Migration, AnyPlanKeepsMeshAndFields) {
   }
 }
 
+TEST_P(Migration, ABalanceByCostSharesOutWhatOneRankHolds) {
+  Scene scene(GetParam());
+  migrate(world(), scene.mesh, scene.fields, std::vector<int>(scene.mesh.element_ids.size(), 0));
+  const BalanceReport report = balance_by_cost(world(), scene.mesh, scene.fields, {}, false);
+  scene.expect_sound();
+  if (world().size() == 1) {
+    EXPECT_EQ(report.migration.moved_elements, 0);
+    return;
+  }
+  EXPECT_LT(report.cost_after, report.cost_before);
+  EXPECT_GT(scene.mesh.elements(), 0);
+  const auto largest = static_cast<Real>(world().max(static_cast<GlobalId>(scene.mesh.elements())));
+  EXPECT_LE(largest * world().size(), 1.5 * static_cast<Real>(scene.mesh.total_elements));
+  EXPECT_NE(describe_balance(report).find("instead of"), std::string::npos);
+}
+
 TEST_P(Migration, AllElementsMayGatherOnOneRankAndSpreadAgain) {
   Scene scene(GetParam());
   const int last = world().size() - 1;
