@@ -51,6 +51,7 @@ void FillingProcess::add_remeshing() {
   lent.mesh = &scene_.mesh;
   lent.fields = &scene_.fields;
   lent.flow_field = "velocity";
+  lent.balances_by_cost = scene_.settings.common.partition.method == PartitionMethod::cost;
   lent.keep_volume = true;
   if (front_) {
     lent.before = [this] { front_->prepare_remesh(); };
