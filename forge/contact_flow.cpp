@@ -120,6 +120,7 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
   stage.before.assign(velocity.begin(), velocity.end());
   if (const Outcome outcome = solve_under_presses(stage); outcome.kind != Outcome::Kind::done) return outcome;
 
+  if (keeps_stress_) compute_stress(scene_, scene_.fields[field_name::stress].values());
   const Displacement& way = stage.displacement;
   scene_.step_velocity.resize(velocity.size());
   for (std::size_t i = 0; i < velocity.size(); ++i) {

@@ -44,6 +44,8 @@ class ContactFlow final : public Component {
 
   const FlowReport& report() const noexcept { return report_; }
   const FlowTotals& totals() const noexcept { return totals_; }
+  /// Whether advance() fills the stress field, of the same state and mesh as velocity and pressure.
+  void set_keeps_stress(bool keeps) { keeps_stress_ = keeps; }
   /// Nothing fixed the mean pressure of the last solve.
   bool pressure_is_free() const { return operator_->pressure_is_free(); }
   /// Drops what belongs to the old mesh. Collective.
@@ -123,7 +125,8 @@ class ContactFlow final : public Component {
   std::vector<Real> gaps_;                    ///< [contact point] m, at the end of the increment
   std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
   bool has_contacts_ = false;                 ///< on any rank
-  bool is_cold_ = true;                       ///< no solution tells Newton's method where to start
+  bool keeps_stress_ = true;
+  bool is_cold_ = true;  ///< no solution tells Newton's method where to start
   GlobalId tried_increment_ = -1;
   int tries_ = 0;  ///< of that increment
   FlowReport report_;
@@ -133,7 +136,8 @@ class ContactFlow final : public Component {
   Real strain_rate_ = 0;
 };
 
-/// Stress deviator and mean of an element at the fields' solution: xx yy xy, or xx yy zz xy yz xz, Pa. Local.
+/// Stress of each element by the fields, on the mesh that they were solved on: 2 viscosity strain rate - mean pressure,
+/// xx yy xy, or xx yy zz xy yz xz, Pa. Local.
 void compute_stress(const Scene& scene, std::span<Real> stress);
 
 }  // namespace malleus::forge

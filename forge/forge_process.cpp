@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -32,11 +33,21 @@ PressState press_state(const nlohmann::json& json) {
   return state;
 }
 
+/// Whether an output or a probe shows the field.
+bool is_recorded(const CommonSections& common, const std::string& field) {
+  const auto shows = [&](const std::vector<std::string>& names) {
+    return names.empty() || std::find(names.begin(), names.end(), field) != names.end();
+  };
+  return shows(common.output.fields) || std::any_of(common.probes.begin(), common.probes.end(),
+                                                    [&](const ProbeSettings& probe) { return shows(probe.fields); });
+}
+
 }  // namespace
 
 ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
     : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
   if (case_.common.remesh && case_.common.remesh->active) remeshing_.emplace(*case_.common.remesh, remeshed_scene());
+  flow_.set_keeps_stress(is_recorded(case_.common, field_name::stress));
   if (case_.common.reference) errors_.emplace(*scene_, flow_, *case_.common.reference);
   if (case_.common.probes.empty()) return;
   probes_.emplace(*scene_->comm, scene_->mesh, case_.common.probes);
@@ -213,7 +224,6 @@ void ForgeProcess::refresh_outputs() {
       quality[i] = simplex_quality<D>(simplex_points<D>(mesh, e));
     }
   });
-  compute_stress(*scene_, scene_->fields[field_name::stress].values());
 }
 
 std::vector<ForgeProcess::Opponent> ForgeProcess::opponents() const {

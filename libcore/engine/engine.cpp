@@ -261,7 +261,10 @@ void Engine::record(const Increment& increment) {
   for (const HistoryCell& cell : process_.history_row()) row.push_back(cell);
   timed("history", [&] { history_->append(row); });
   if (Probes* probes = process_.probes()) {
-    timed("probes", [&] { probes->record(increment.time, process_.mesh(), process_.fields()); });
+    timed("probes", [&] {
+      process_.refresh_outputs();
+      probes->record(increment.time, process_.mesh(), process_.fields());
+    });
   }
   print_increment(increment);
   if (increment.number % settings_.output_every == 0) write_fields(increment.number);

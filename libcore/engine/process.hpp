@@ -60,7 +60,7 @@ class Process {
   virtual std::optional<std::string> finished() = 0;
   /// How much of the way to that end is done, 0..1; 0 where nothing tells. For the time left in the log.
   virtual Real progress() { return 0; }
-  /// Brings fields that are only looked at (quality, stress) up to date before an output.
+  /// Brings fields that are only looked at (quality) up to date before probes and outputs record them.
   virtual void refresh_outputs() {}
 
   /// @name history.csv, beyond the columns of the engine: same on all ranks

@@ -3,10 +3,14 @@
 Frictionless upsetting of a prism between flat ends is homogeneous: with the rate V/H along the axis, a free axis carries
 nothing, and F = A sqrt(3) K (sqrt(3) V/H)^m; in plane strain F = A 2 K (2 V/H)^m. Exact on any mesh.
 """
+import csv
 import math
 import pathlib
 import tempfile
 import unittest
+
+import h5py
+import numpy
 
 from box_msh import BoxMesh
 from runs import history, run, summary
@@ -167,6 +171,47 @@ class Upsetting(Forging):
                 text = text.replace(f"consistency = {K!r}", "consistency = 179.2 MPa.s^m")
             forces.append(self.forge(text)[-1]["force_upper_y_N"])
         self.assertAlmostEqual(forces[1] / forces[0], 1, delta=1e-8)
+
+
+class Stress(Forging):
+    """2 eta eps - p I of the state that velocity, pressure and viscosity belong to, in outputs and at probes."""
+    DIAGONAL, OTHERS = [0, 3, 5], [1, 2, 4]  # of xx xy xz yy yz zz
+
+    def stick(self, dim, ranks, extra):
+        box_mesh(self.directory / "box.msh", dim, cells=(4, 4, 4))
+        text = case_text(0.3, dim, dim - 1, "tools", time="increments = 3\nstep = 0.05", extra=extra)
+        self.forge(text.replace("shape = plane\n", "shape = plane\nfriction = 1\n"), "-D",
+                   "motion.volume_target=no", "-D", "motion.scheme=adams-bashforth-2", ranks=ranks)
+
+    def test_it_is_of_the_state_of_its_output(self):
+        for dim, ranks in ((2, 1), (3, 3)):
+            self.stick(dim, ranks, "[output]\nprecision = float64\n")
+            files = sorted((self.directory / "out" / "case.fields").glob("s*.h5"))
+            for file in files[ranks:]:  # the first state is at rest
+                with h5py.File(file) as h5:
+                    for part in h5.values():
+                        stress, pressure = part["stress"][:], part["pressure"][:][part["cells"][:]].mean(axis=1)
+                        scale = numpy.abs(stress).max()
+                        normal = stress[:, self.DIAGONAL[:dim]] + pressure[:, None]
+                        j2 = 0.5 * (normal ** 2).sum(axis=1) + (stress[:, self.OTHERS] ** 2).sum(axis=1)
+                        equivalent = 3 * part["viscosity"][:] * part["strain_rate"][:]
+                        self.assertLess(numpy.abs(numpy.sqrt(3 * j2) - equivalent).max() / scale, 1e-8)
+
+    def test_probes_show_the_increments_own(self):
+        # Frictionless: the free direction carries nothing, the other one the force.
+        box_mesh(self.directory / "box.msh", 2, cells=(4, 4))
+        for fields in ("", "fields = stress pressure\n"):
+            text = case_text(0.3, 2, 1, "boundaries", time="increments = 3\nstep = 0.02",
+                             extra=f"[probe.p]\npoint = 0.4 0.4\n{fields}[output]\nfields = velocity\n")
+            rows = self.forge(text, "-D", "solver.newton_tolerance=1e-8", "-D", "motion.volume_target=no")
+            with open(self.directory / "out" / "probe-p.csv") as file:
+                probed = list(csv.DictReader(file))
+            for n, (row, at) in enumerate(zip(rows, probed)):
+                height = 1 - 0.02 * n
+                force = -row["force_high_y_N"] * height  # the width is 1 / height
+                self.assertAlmostEqual(float(at["stress_1"]) / force, 1, delta=2e-3)
+                self.assertAlmostEqual(float(at["stress_0"]) / force, 0, delta=1e-5)
+                self.assertAlmostEqual(-2 * float(at["pressure"]) / force, 1, delta=2e-3)
 
 
 class Reference(Forging):
