@@ -214,7 +214,7 @@ class StepClock {
  public:
   void end(const Communicator& comm, const std::string& step) {
     const auto now = std::chrono::steady_clock::now();
-    wall[step] = comm.max(std::chrono::duration<Real>(now - start_).count());
+    wall[step] += comm.max(std::chrono::duration<Real>(now - start_).count());
     start_ = now;
   }
   std::map<std::string, Real> wall;
@@ -224,14 +224,17 @@ class StepClock {
 };
 
 void write_result(const Communicator& comm, const PartitionCommand& command, Mesh& mesh, FieldStore& fields,
-                  const PartitionPlan& plan) {
+                  const PartitionPlan& plan, StepClock& clock) {
   if (!command.parts_file.empty()) write_element_list(comm, mesh, command.parts_file, plan.parts);
+  clock.end(comm, "write");
   const std::vector<int> parts = gather_parts(comm, mesh, fields, plan.parts, command.parts);
+  clock.end(comm, "move");
   if (command.output.ends_with(".h5")) {
     write_mesh_file(comm, command.output, mesh, fields, parts, command.parts);
   } else {
     write_mesh(comm, mesh, fields, command.output);
   }
+  clock.end(comm, "write");
 }
 
 }  // namespace
@@ -264,8 +267,7 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
                                  ? release_plan(comm, mesh, command, architecture, from)
                                  : make_partition(comm, mesh, command.model, architecture, command.options, from);
   clock.end(comm, "partition");
-  write_result(comm, command, mesh, fields, plan);
-  clock.end(comm, "write");
+  write_result(comm, command, mesh, fields, plan, clock);
   const MeshStatistics statistics = mesh_statistics(comm, mesh);
   const GlobalId memory = comm.sum(peak_memory_bytes());
   if (comm.is_root()) print_plan(plan, command.parts);

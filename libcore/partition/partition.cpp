@@ -21,7 +21,9 @@ namespace {
 /// Above this imbalance of the present partition a new one is made as well, and the better of the two taken: flows
 /// then move whole parts, and the borders that they leave are long.
 constexpr Real start_anew_from = 0.5;
-constexpr int levelling_rounds = 6;
+constexpr int levelling_rounds = 16;
+constexpr int levelling_patience = 5;        ///< rounds without a better partition after which it ends
+constexpr Real levelling_tolerance = 0.004;  ///< of the loads about the moved targets
 /// Mesh edges that are cut with a face between elements, measured on refined partitions of tetrahedral meshes.
 constexpr Real mesh_edges_per_face = 2.5;
 
@@ -219,19 +221,23 @@ class Planner {
     const Real total = std::accumulate(targets_.begin(), targets_.end(), Real{0});
     std::vector<Real> targets = targets_;
     Candidate current = best;
-    for (int round = 0; round < levelling_rounds; ++round) {
+    int since_best = 0;
+    for (int round = 0; round < levelling_rounds && since_best < levelling_patience; ++round) {
       move_targets(current.cost, targets, total);
       std::vector<int> parts = current.parts;
       parts.resize(static_cast<std::size_t>(graph_.vertices()));
       graph_.halo.update_copies(std::span<std::int32_t>(parts), 1);
       PairRefiner refiner(comm_, graph_, architecture_, std::move(parts), targets);
-      refiner.diffuse(0.003, 6);
-      refiner.smooth(0.004, {2, 3, 1, 100});
-      refiner.tidy(0.003);
+      refiner.diffuse(levelling_tolerance, 6);
+      refiner.smooth(1.3 * levelling_tolerance, {2, 3, 1, 100});
+      refiner.tidy(levelling_tolerance);
       current.parts = std::move(refiner).take_parts();
       current.parts.resize(static_cast<std::size_t>(graph_.owned()));
       current.cost = cost_of(current.parts);
-      if (current.cost.cost < best.cost.cost) best = current;
+      ++since_best;
+      if (current.cost.cost >= best.cost.cost) continue;
+      best = current;
+      since_best = 0;
     }
     return best;
   }
