@@ -242,6 +242,29 @@ bool has_opening(const Scene& scene, const std::vector<GateDrive>& drives) {
   return false;
 }
 
+/// Where the case says what an inlet is to do: "case.ini:12: [inlet.gate] flow_rate".
+std::string source_of(const InletSettings& inlet, const BoundaryPart& part) {
+  if (inlet.pressure) return inlet.pressure->source();
+  if (inlet.flow_rate) return inlet.flow_rate->source();
+  if (inlet.velocity && inlet.velocity->speed) return inlet.velocity->speed->source();
+  for (const auto& component : inlet.velocity ? inlet.velocity->vector : inlet.velocity_components) {
+    if (component && !component->source().empty()) return component->source();
+  }
+  return "[" + part.section + "]";
+}
+
+void check_drive(const InletSettings& inlet, const BoundaryPart& part, const GateDrive& drive, Real time) {
+  if (!std::isfinite(drive.value)) {
+    throw InputError(fmt::format("{}: is not a number at {:.6g} s", source_of(inlet, part), time));
+  }
+  if (drive.kind != GateDrive::Kind::pressure && drive.value < 0) {
+    throw InputError(fmt::format(
+        "{}: asks for {:.4g} m^3/s at {:.6g} s, out of the cavity; an inlet lets fluid in: turn the sign, or let fluid "
+        "out of a [vent.NAME]",
+        source_of(inlet, part), drive.value, time));
+  }
+}
+
 /// A closed cavity takes only as much as it gives.
 void refuse_sealed(const Scene& scene, const std::vector<GateDrive>& drives, const NodeConstraints& constraints) {
   Real net = 0;
@@ -283,9 +306,7 @@ std::vector<GateDrive> asked_drives(const Scene& scene, Real time) {
     } else {
       drive = {GateDrive::Kind::velocity, asked_flow(scene, *part, time)};
     }
-    if (!std::isfinite(drive.value)) {
-      throw InputError(fmt::format("[{}]: what is asked for at {:.6g} s is not a number", part->section, time));
-    }
+    check_drive(inlet, *part, drive, time);
   }
   return drives;
 }

@@ -11,9 +11,10 @@ namespace malleus::inject {
 /// fronts to their start. Collective.
 Real way_of_fronts(const Scene& scene, FrontSet& fronts);
 
-/// Increments: the front crosses way / mesh size elements, and an increment a stride of them, whatever the gates do;
-/// less where [time] end comes before the cavity is full. Times and memory from measured constants of one core.
-/// way: of way_of_fronts(), 0 without fronts. solves_flow: false where the case prescribes it. Collective.
+/// Increments: the front crosses the elements of its way, and an increment a stride of them; more where it starts
+/// faster than it goes on, less where [time] end comes before the cavity is full. Times and memory from measured
+/// constants of one core. way: of way_of_fronts(), 0 without fronts. solves_flow: false where the case prescribes it.
+/// Collective.
 Forecast forecast_filling(const Scene& scene, Real way, Real stride, bool solves_flow, bool is_linear);
 
 }  // namespace malleus::inject

@@ -20,10 +20,14 @@ Converter<GateVelocity> gate_velocity_converter() {
     GateVelocity velocity;
     try {
       velocity.speed = expression_converter("m/s").read(raw, key);
+      velocity.speed->set_source(key.source);
       return velocity;
     } catch (const InputError&) {
       const auto components = vector_converter("m/s").read(raw, key);
-      for (std::size_t i = 0; i < components.size(); ++i) velocity.vector[i] = Expression(components[i]);
+      for (std::size_t i = 0; i < components.size(); ++i) {
+        velocity.vector[i] = Expression(components[i]);
+        velocity.vector[i]->set_source(key.source);
+      }
       return velocity;
     }
   };
@@ -177,6 +181,12 @@ void InletSettings::validate(Section& s) const {
   }
   const int ways = (has_velocity() ? 1 : 0) + (flow_rate ? 1 : 0) + (pressure ? 1 : 0);
   if (ways != 1) s.fail("needs one of velocity, flow_rate and pressure");
+  constexpr const char* outward =
+      "an inlet lets fluid into the cavity: give a positive value, or let fluid out of a [vent.NAME]";
+  if (flow_rate && flow_rate->is_constant() && (*flow_rate)({}, 0) < 0) s.fail("flow_rate", outward);
+  if (velocity && velocity->speed && velocity->speed->is_constant() && (*velocity->speed)({}, 0) < 0) {
+    s.fail("velocity", outward);
+  }
   if (switches() != then_pressure.has_value()) {
     s.fail("a switch-over needs then_pressure and one of switch_pressure and switch_fill");
   }
@@ -296,7 +306,24 @@ int InjectCase::initial_fluid() const {
   return initial && !initial->fluid.empty() ? fluid_index(initial->fluid) : 0;
 }
 
+/// Whether anything in the case can move the fluids.
+bool InjectCase::is_driven() const {
+  const auto presses = [](const VentSettings& vent) {
+    return !vent.pressure.is_constant() || vent.pressure({}, 0) != 0;
+  };
+  const auto acts = [](const BoundarySettings& boundary) { return boundary.type != BoundarySettings::Type::symmetry; };
+  return !inlets.empty() || flow.is_prescribed() || common.gravity || common.body_force ||
+         std::any_of(vents.begin(), vents.end(), presses) ||
+         std::any_of(common.boundaries.begin(), common.boundaries.end(), acts);
+}
+
 void InjectCase::check(CaseReader& reader) const {
+  if (!is_driven()) {
+    reader.fail("inlet", "", "nothing moves the fluids: add an [inlet.NAME], or prescribe the flow in [flow]");
+  } else if (fluids.size() > 1 && inlets.empty() && shapes.empty() && time.increments != 0) {
+    reader.fail("inlet", "",
+                "there is no front: add an [inlet.NAME] for a fluid to come in, or an [initial.NAME] where it is");
+  }
   const bool is_mixture = fluids.size() > 1;
   if (is_mixture && (!initial || initial->fluid.empty())) {
     reader.fail("initial", "fluid", "several fluids: [initial] fluid must name the one that fills the cavity");

@@ -177,7 +177,12 @@ level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
                               (("fluid = polymer", "fluid = polymr"), "did you mean 'polymer'"),
                               (("flow_rate", "pressure = 1e5\nflow_rate"), "one of velocity, flow_rate and pressure"),
                               (("group = cavity_y_high", "group = cavity_y_low"), "already"),
-                              (("fluid = air", "fluid = polymer"), "fills the cavity already")):
+                              (("fluid = air", "fluid = polymer"), "fills the cavity already"),
+                              ((f"flow_rate = {U * H}", "flow_rate = -1"), "[inlet.gate] flow_rate = -1: an inlet lets fluid into"),
+                              ((f"flow_rate = {U * H}", "flow_rate = \"1-t-2\""), "[inlet.gate] flow_rate: asks for -1 m^3/s at 0 s"),
+                              ((f"flow_rate = {U * H}", "velocity = -1 0"), "[inlet.gate] velocity: asks for -0.004 m^3/s"),
+                              (("[inlet.gate]\ngroup = cavity_x_low\nfluid = polymer\n" + f"flow_rate = {U * H}",
+                                "[wall.gate]\ngroup = cavity_x_low"), "nothing moves the fluids")):
             with self.subTest(words=words):
                 self.assertIn(change[0], whole)
                 for ranks in (1, 2):
