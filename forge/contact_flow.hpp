@@ -3,6 +3,7 @@
 /// The velocity and pressure of the bodies, with what holds and pushes them.
 
 #include "engine/component.hpp"
+#include "forge/initial_contact.hpp"
 #include "forge/scene.hpp"
 #include "solvers/newton.hpp"
 
@@ -38,6 +39,7 @@ class ContactFlow final : public Component {
   std::string name() const override { return "flow"; }
   std::string purpose() const override;
   FieldUse uses() const override;
+  void start() override { report_clearances(scene_); }
   Outcome advance(const Increment& increment) override;
   void roll_back() override;
   Outcome solve_once() override;

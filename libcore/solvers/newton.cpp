@@ -129,15 +129,15 @@ Real Loop::sound_norm() const {
 
 /// While the branches of the terms (which contacts hold) are still sought, each step is made with those of its start:
 /// a smooth problem, whose line search does not stop where a contact closes. This is the active set method; the set of
-/// a step is that of the whole last step, whatever share of it was taken. A warm start brings its own set, as its
-/// velocities say less of pressures than the set does. Later each evaluation has its own branches, and the search on
-/// the convex potential ends any cycle.
+/// a step is that of the whole last step, whatever share of it was taken. The terms bring a first set, as
+/// the velocities of a guess say less of pressures than that does. Later each evaluation has its own branches, and the
+/// search on the convex potential ends any cycle.
 void Loop::choose_branches(int iteration, bool cold) {
   if (!op_.has_terms() || iteration >= options_.set_iterations) return;
+  op_.choose_branches(Branches::carry, state_);
   if (iteration == 0 && cold) {
-    op_.choose_branches(Branches::hold, state_);
+    report_ = op_.residual(state_, residual_);  // at the viscosities of the start
   } else {
-    op_.choose_branches(Branches::carry, state_);
     evaluate();
   }
 }

@@ -314,6 +314,63 @@ class Robustness(Forging):
         self.assertEqual(sum("the volume of the bodies has changed by" in text for text in warnings), 1)
 
 
+class Start(Forging):
+    def messages(self, text, *options, ranks=1):
+        self.forge(text, "--steps", "1", *options, ranks=ranks)
+        return (self.directory / "out" / "run.log").read_text(), summary(self.directory / "out")["warnings"]
+
+    def test_gaps_and_overlaps_are_told(self):
+        for dim in (2, 3):
+            axis = dim - 1
+            box_mesh(self.directory / "box.msh", dim, cells=(4, 4, 4))
+            text = case_text(0.3, dim, axis, "tools")
+            at_top = f"point = {vector(dim, axis, 1.0)}"
+            ranks = 1 if dim == 2 else 3
+            log, warnings = self.messages(text, ranks=ranks)
+            self.assertIn("tool upper: touches at the start", log)
+            self.assertEqual([w for w in warnings if "overlap" in w], [])
+            log, _ = self.messages(text.replace(at_top, f"point = {vector(dim, axis, 1.125)}"), ranks=ranks)
+            self.assertIn("tool upper: 0.125 m away at the start", log)
+            _, warnings = self.messages(text.replace(at_top, f"point = {vector(dim, axis, 0.999)}"), ranks=ranks)
+            overlaps = [w for w in warnings if "overlap" in w]
+            self.assertEqual(len(overlaps), 1)
+            self.assertIn("tool upper: 0.001 m of overlap at the start", overlaps[0])
+            self.assertNotIn("wrong side", overlaps[0])
+
+    def test_a_tool_turned_the_wrong_way_is_told(self):
+        box_mesh(self.directory / "box.msh", 2, cells=(4, 4))
+        text = case_text(0.3, 2, 1, "tools", time="increments = 1\nstep = 1e-3")
+        text += "[tool.turned]\nshape = plane\npoint = 0 1\nnormal = 0 1\n"
+        (self.directory / "case.ini").write_text(text)
+        run("forge", self.directory / "case.ini", self.directory / "out", check=False)
+        self.assertIn("wrong side?", (self.directory / "out" / "run.log").read_text())
+
+
+class Gravity(Forging):
+    def test_the_ground_bears_the_weight(self):
+        for dim in (2, 3):
+            axis = dim - 1
+            box_mesh(self.directory / "box.msh", dim, cells=(3, 3, 3))
+            text = case_text(1, dim, axis, "tools").replace("rate_sensitivity = 1", "rate_sensitivity = 1\ndensity = 7800")
+            text = text[:text.index("[tool.upper]")] + text[text.index("[tool.lower]"):]
+            row = self.forge(text + f"[gravity]\nacceleration = {vector(dim, axis, -9.81)}\n", ranks=2)[0]
+            self.assertAlmostEqual(row[f"force_lower_{'xyz'[axis]}_N"] / (-7800 * 9.81), 1, delta=1e-5)
+
+    def test_a_viscous_column_sinks_at_its_rate(self):
+        # Plane strain, H = 1, free on one side: mean axial stress rho g (H - y) = 4 eta e, mean over y: e = rho g H / (8 eta).
+        # With m = 1, eta = K: the top sinks with the integral of e, rho g H^2 / (8 eta), but for shear near the corners.
+        box_mesh(self.directory / "box.msh", 2, size=(0.1, 1.0), cells=(3, 30))
+        eta = 1e4
+        text = case_text(1, 2, 1, "tools", time="increments = 1\nstep = 1e-6").replace(f"{K!r}", repr(eta))
+        text = text.replace("rate_sensitivity = 1", "rate_sensitivity = 1\ndensity = 1000")
+        text = text[:text.index("[tool.upper]")] + text[text.index("[tool.lower]"):]
+        text += "[gravity]\nacceleration = 0 -10\n[probe.top]\npoint = 0.05 0.999\nfields = velocity\n"
+        self.forge(text)
+        with open(self.directory / "out" / "probe-top.csv") as file:
+            speed = float(file.read().splitlines()[-1].split(",")[-1])
+        self.assertAlmostEqual(-speed / (1000 * 10 / (8 * eta)), 1, delta=0.03)
+
+
 class Chained(Forging):
     def test_two_operations_are_one(self):
         # Half of the stroke, then the other half as a case of its own, on another number of ranks.
