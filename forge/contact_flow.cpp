@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/log.hpp"
+#include "solvers/linear_database.hpp"
 
 namespace malleus::forge {
 namespace {
@@ -15,22 +16,6 @@ constexpr int tries_before_picard = 3;  ///< of an increment, each with half the
 constexpr int most_picard_steps = 400;
 /// A node may end this share of an edge deeper in a tool than its linearised gap says.
 constexpr Real tolerated_surprise = 0.02;
-
-LinearSolverOptions linear_options(LinearChoice choice) {
-  LinearSolverOptions options;
-  switch (choice) {
-    case LinearChoice::gmres_ilu:
-      options.method = LinearMethod::gmres_ilu;
-      break;
-    case LinearChoice::conjugate_residual:
-      options.method = LinearMethod::conjugate_residual;
-      break;
-    case LinearChoice::block_triangular:
-      options.method = LinearMethod::block_triangular;
-      break;
-  }
-  return options;
-}
 
 }  // namespace
 

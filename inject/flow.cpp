@@ -11,6 +11,7 @@
 #include "fem/pressure_extension.hpp"
 #include "mesh/space_filling_curve.hpp"
 #include "solvers/level_set_speed.hpp"
+#include "solvers/linear_database.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -27,7 +28,11 @@ FieldSpec velocity_spec(int dim) {
 }  // namespace
 
 Flow::Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state)
-    : scene_(scene), mixture_(mixture), fronts_(fronts), state_(state) {
+    : scene_(scene),
+      mixture_(mixture),
+      fronts_(fronts),
+      state_(state),
+      linear_(linear_options(scene.settings.common.solver.linear_method)) {
   state_.gates.resize(scene.settings.inlets.size());
   scene_.fields.declare(scene_.mesh, velocity_spec(scene_.mesh.dim));
   scene_.fields.declare(scene_.mesh, {"pressure", "Pa", Support::node, 1, Transfer::interpolate, false});
@@ -238,7 +243,7 @@ void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::
     std::copy_n(unknowns_.nodes.data() + node * (dim + 1), dim, velocity.data() + node * dim);
     pressure[node] = unknowns_.nodes[node * (dim + 1) + dim];
   }
-  extend_pressure(scene_.comm, scene_.mesh, operator_->viscosity(), pressure);
+  extend_pressure(scene_.comm, scene_.mesh, operator_->viscosity(), operator_->force_density(), pressure);
   const std::span<Real> viscosity = scene_.fields["viscosity"].values();
   const std::span<Real> strain_rate = scene_.fields["strain_rate"].values();
   operator_->update_viscosity(unknowns_);

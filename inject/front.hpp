@@ -57,6 +57,9 @@ class Front final : public Component {
   ImposedLevelSet imposed(std::size_t front, Real dt) const;
   std::vector<char> wetted_nodes() const;
   std::vector<char> open_nodes() const;
+  std::vector<char> kept_apart(std::size_t front) const;
+  void restore_volumes();
+  void warn_of_backflow();
   Outcome substep(Real start, Real dt);
   void mark_fill_time(const std::vector<Real>& before, Real start, Real dt);
   std::vector<Real> union_of_fronts() const;
@@ -72,6 +75,7 @@ class Front final : public Component {
   int substeps_ = 0;
   GlobalId redistances_ = 0;
   GlobalId pockets_filled_ = 0;
+  bool warned_of_backflow_ = false;
   std::vector<char> open_;  ///< [node], where air can come in or go out
 
   std::vector<std::vector<Real>> saved_level_sets_;  ///< before the increment, for roll_back()

@@ -1,6 +1,7 @@
 #include "inject/front_set.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "mesh/space_filling_curve.hpp"
 #include "solvers/facet_distance.hpp"
@@ -119,6 +120,28 @@ bool FrontSet::has_way_out() const {
     }
   }
   return scene_.comm.any(is_open);
+}
+
+bool FrontSet::part() {
+  bool any = false;
+  for (LocalId n = 0; n < scene_.mesh.nodes(); ++n) {
+    const auto node = static_cast<std::size_t>(n);
+    std::size_t first = 0;
+    std::size_t second = size();
+    for (std::size_t i = 1; i < size(); ++i) {
+      if (values(i)[node] > values(first)[node]) {
+        second = std::exchange(first, i);
+      } else if (second == size() || values(i)[node] > values(second)[node]) {
+        second = i;
+      }
+    }
+    if (second == size() || !(values(second)[node] > 0)) continue;
+    const Real half = (values(first)[node] - values(second)[node]) / 2;
+    values(first)[node] = half;
+    values(second)[node] = -half;
+    any = true;
+  }
+  return scene_.comm.any(any);
 }
 
 void FrontSet::set_initial() {

@@ -33,6 +33,11 @@ class FrontSet {
   /// Whether air, or a fluid under a given pressure, can still leave or enter. Collective.
   bool has_way_out() const;
 
+  /// Where two fluids claim a node, the one with the larger level set keeps it: both take half the difference, with
+  /// opposite signs, so that their fronts meet half-way (Merriman, Bence, Osher 1994). Returns whether there were any.
+  /// Collective.
+  bool part();
+
   /// Level sets at the start: the shapes of the case; else the front of a fluid stands at its inlets. Collective.
   void set_initial();
 

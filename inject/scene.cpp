@@ -65,10 +65,26 @@ std::vector<int> parts_of_groups(const Mesh& mesh, const std::vector<BoundaryPar
   return part_of_group;
 }
 
-/// Names what lies on the boundary without a section. Collective.
-void refuse_unnamed(const Communicator& comm, const Mesh& mesh, const std::vector<int>& part_of_group) {
+/// [exterior facet] whether it lies on the axis of an axisymmetric scene, to rounding of the mesh file's coordinates.
+std::vector<char> facets_on_axis(const Mesh& mesh, Geometry geometry) {
+  std::vector<char> on_axis(static_cast<std::size_t>(mesh.exterior_facets), 0);
+  if (geometry != Geometry::axisymmetric) return on_axis;
+  Real largest = 0;
+  for (LocalId node = 0; node < mesh.nodes(); ++node) largest = std::max(largest, std::abs(mesh.point(node)[0]));
+  for (LocalId f = 0; f < mesh.exterior_facets; ++f) {
+    const auto nodes = mesh.nodes_of_facet(f);
+    on_axis[static_cast<std::size_t>(f)] = std::all_of(
+        nodes.begin(), nodes.end(), [&](LocalId node) { return std::abs(mesh.point(node)[0]) <= 1e-10 * largest; });
+  }
+  return on_axis;
+}
+
+/// Names what lies on the boundary, and not on the axis, without a section. Collective.
+void refuse_unnamed(const Communicator& comm, const Mesh& mesh, const std::vector<int>& part_of_group,
+                    std::span<const char> on_axis) {
   std::vector<GlobalId> counts(mesh.group_names.size() + 1, 0);  // last: facets without a group
   for (LocalId f = 0; f < mesh.exterior_facets; ++f) {
+    if (on_axis[static_cast<std::size_t>(f)] != 0) continue;
     const std::int32_t group = mesh.facet_group[static_cast<std::size_t>(f)];
     if (group < 0) ++counts.back();
     if (group >= 0 && part_of_group[static_cast<std::size_t>(group)] < 0) ++counts[static_cast<std::size_t>(group)];
@@ -114,12 +130,21 @@ void Scene::rebuild() {
   parts = named_parts(settings);
   for (BoundaryPart& part : parts) part.group = mesh.find_group(group_of(settings, part));
   const std::vector<int> part_of_group = parts_of_groups(mesh, parts);
-  if (!settings.flow.is_prescribed()) refuse_unnamed(comm, mesh, part_of_group);
+  const std::vector<char> on_axis = facets_on_axis(mesh, geometry);
+  if (!settings.flow.is_prescribed()) refuse_unnamed(comm, mesh, part_of_group, on_axis);
   for (BoundaryPart& part : parts) {
     part.facets = facets_of_group(mesh, part.group);
     part.normals.emplace(mesh, part.group, geometry);
     part.area = boundary_area(comm, mesh, geometry, part.facets);
-    if (part.area > 0) continue;
+    const bool is_axis = std::all_of(part.facets.begin(), part.facets.end(),
+                                     [&](LocalId f) { return on_axis[static_cast<std::size_t>(f)] != 0; });
+    const bool exists = comm.any(!part.facets.empty());
+    if (part.area > 0 || (exists && part.kind == BoundaryPart::Kind::symmetry)) continue;
+    if (exists && comm.all(is_axis)) {
+      throw InputError(
+          fmt::format("[{}] group: '{}' is the axis, through which nothing passes; leave it without a section",
+                      part.section, group_of(settings, part)));
+    }
     throw InputError(fmt::format("[{}] group: no facet of '{}' lies on the boundary of the mesh", part.section,
                                  group_of(settings, part)));
   }

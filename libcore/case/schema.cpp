@@ -120,6 +120,23 @@ bool CaseReader::given(std::string_view section, std::string_view key) const {
   return file_.find_entry(section.substr(0, dot), name, key) != nullptr;
 }
 
+std::string CaseReader::located(const std::string& message) const {
+  const std::string path = file_.path().string();
+  if (message.starts_with("the ")) return fmt::format("{}: {}", path, message);
+  const std::size_t close = message.find(']');
+  if (!message.starts_with("[") || close == std::string::npos) return message;
+  const std::string_view title = std::string_view(message).substr(1, close - 1);
+  const std::size_t dot = title.find('.');
+  const std::string_view name = dot == std::string_view::npos ? "" : title.substr(dot + 1);
+  const CaseSection* section = file_.find(title.substr(0, dot), name);
+  if (section == nullptr) return fmt::format("{}: {}", path, message);
+  const std::size_t key_at = std::min(message.find_first_not_of(' ', close + 1), message.size());
+  const std::size_t key_end = std::min(message.find_first_of(" :=", key_at), message.size());
+  const CaseEntry* entry =
+      file_.find_entry(title.substr(0, dot), name, std::string_view(message).substr(key_at, key_end - key_at));
+  return fmt::format("{}: {}", (entry != nullptr ? entry->place : section->place).text(), message);
+}
+
 void CaseReader::fail(std::string_view section, std::string_view key, const std::string& message) {
   const std::size_t dot = section.find('.');
   const std::string_view kind = section.substr(0, dot);

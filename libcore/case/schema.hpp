@@ -115,6 +115,10 @@ class CaseReader {
   void fail(std::string_view section, std::string_view key, const std::string& message);
   bool given(std::string_view section, std::string_view key) const;
 
+  /// A message about the scene with its place in the case: one that starts with "[section]" or "[section] key" gets the
+  /// file and line of that, one that starts with "the " the file; others have a place of their own. Local.
+  std::string located(const std::string& message) const;
+
   /// Throws one InputError that holds every mistake of the case, on all ranks. Collective.
   void finish();
   /// Throws one InputError with every unknown group and every vector of another dimension than the mesh's. Local.

@@ -116,6 +116,17 @@ void check_partition(const CommonSections& common, CaseReader& reader) {
   }
 }
 
+int run_scene(const Communicator& comm, Simulator& simulator, Mesh mesh, RunSettings settings, CaseReader& reader) {
+  const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
+  const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
+  const CommonSections& common = simulator.common();
+  check_output_fields(*process, common, reader);
+  check_probe_fields(*process, common, reader);
+  reader.check_mesh(names);
+  settings.resolved_case = reader.resolved(settings.directory);
+  return Engine(comm, *process, std::move(settings)).run();
+}
+
 int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
   CommonSections& common = simulator.common();
   common.case_settings.name = line.case_file.stem().string();
@@ -134,12 +145,11 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
     log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, {}, true)));
   }
   RunSettings settings = run_settings(line, simulator);
-  const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
-  check_output_fields(*process, common, reader);
-  check_probe_fields(*process, common, reader);
-  reader.check_mesh(names);
-  settings.resolved_case = reader.resolved(settings.directory);
-  return Engine(comm, *process, std::move(settings)).run();
+  try {
+    return run_scene(comm, simulator, std::move(mesh), std::move(settings), reader);
+  } catch (const InputError& error) {
+    throw InputError(reader.located(error.what()));
+  }
 }
 
 }  // namespace

@@ -18,21 +18,28 @@ std::vector<Real> modelled_nodes(const Mesh& mesh, std::span<const Real> element
   return is_known;
 }
 
-/// Sums of the known pressures of neighbours and their number, [node][2].
-std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const Real> is_known, std::span<const Real> pressure) {
+/// f . (x_to - x_from), Pa.
+Real head(const Mesh& mesh, std::span<const Real> element_force, LocalId element, LocalId from, LocalId to) {
+  if (element_force.empty()) return 0;
+  const Real* force = element_force.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(mesh.dim);
+  Real sum = 0;
+  for (int c = 0; c < mesh.dim; ++c) sum += force[c] * (mesh.point(to)[c] - mesh.point(from)[c]);
+  return sum;
+}
+
+/// Sums of the pressures that known neighbours tell, and their number, [node][2].
+std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const Real> is_known,
+                                     std::span<const Real> element_force, std::span<const Real> pressure) {
   std::vector<Real> sums(is_known.size() * 2, 0.0);
   for (LocalId e = 0; e < mesh.elements(); ++e) {
     const auto nodes = mesh.nodes_of_element(e);
-    Real sum = 0;
-    Real count = 0;
-    for (const LocalId node : nodes) {
-      if (is_known[static_cast<std::size_t>(node)] == 0) continue;
-      sum += pressure[static_cast<std::size_t>(node)];
-      count += 1;
-    }
-    for (const LocalId node : nodes) {
-      sums[static_cast<std::size_t>(node) * 2] += sum;
-      sums[static_cast<std::size_t>(node) * 2 + 1] += count;
+    for (const LocalId from : nodes) {
+      if (is_known[static_cast<std::size_t>(from)] == 0) continue;
+      for (const LocalId to : nodes) {
+        Real* sum = sums.data() + static_cast<std::size_t>(to) * 2;
+        sum[0] += pressure[static_cast<std::size_t>(from)] + head(mesh, element_force, e, from, to);
+        sum[1] += 1;
+      }
     }
   }
   mesh.node_halo.add_to_owners(sums, 2);
@@ -43,13 +50,13 @@ std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const Real> is_
 }  // namespace
 
 void extend_pressure(const Communicator& comm, const Mesh& mesh, std::span<const Real> element_viscosity,
-                     std::span<Real> pressure) {
+                     std::span<const Real> element_force, std::span<Real> pressure) {
   std::vector<Real> is_known = modelled_nodes(mesh, element_viscosity);
   for (int layer = 0; layer < most_layers; ++layer) {
     bool any_unknown = false;
     for (const Real known : is_known) any_unknown = any_unknown || known == 0;
     if (!comm.any(any_unknown)) return;
-    const std::vector<Real> sums = sums_of_neighbours(mesh, is_known, pressure);
+    const std::vector<Real> sums = sums_of_neighbours(mesh, is_known, element_force, pressure);
     for (std::size_t node = 0; node < is_known.size(); ++node) {
       if (is_known[node] > 0 || sums[2 * node + 1] == 0) continue;
       pressure[node] = sums[2 * node] / sums[2 * node + 1];

@@ -325,6 +325,19 @@ std::vector<Real> StokesOperator::subscale_velocity(const StokesState& state) co
   return result;
 }
 
+std::vector<Real> StokesOperator::force_density() const {
+  if (loads_.element_force.empty() && loads_.node_force.empty()) return {};
+  std::vector<Real> result(static_cast<std::size_t>(mesh_->elements()) * static_cast<std::size_t>(mesh_->dim));
+  with_dim(mesh_->dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < mesh_->elements(); ++e) {
+      Eigen::Map<Point<D>>(result.data() + static_cast<std::size_t>(e) * D) =
+          element_load<MiniElement<D>>(e).force.rowwise().mean();
+    }
+  });
+  return result;
+}
+
 WorstNode StokesOperator::worst_node(const LinearVector& residual) const {
   const int dim = mesh_->dim;
   WorstNode worst;

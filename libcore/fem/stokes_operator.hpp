@@ -133,6 +133,8 @@ class StokesOperator {
   /// Mean velocity of each element's subscales (see MiniElement), [element][dim], m/s; zero where nothing is modelled.
   /// What flows through an element is the velocity at its nodes and this. At the current viscosities. Local.
   std::vector<Real> subscale_velocity(const StokesState& state) const;
+  /// Mean force of each element's loads, [element][dim], N/m^3; empty where none acts inside. Local.
+  std::vector<Real> force_density() const;
   /// Of a result of residual(). Collective.
   WorstNode worst_node(const LinearVector& residual) const;
 

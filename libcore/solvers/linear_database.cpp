@@ -38,6 +38,22 @@ void read_integer(const char* name, int low, int& value) {
 
 }  // namespace
 
+LinearSolverOptions linear_options(LinearChoice choice) {
+  LinearSolverOptions options;
+  switch (choice) {
+    case LinearChoice::gmres_ilu:
+      options.method = LinearMethod::gmres_ilu;
+      break;
+    case LinearChoice::conjugate_residual:
+      options.method = LinearMethod::conjugate_residual;
+      break;
+    case LinearChoice::block_triangular:
+      options.method = LinearMethod::block_triangular;
+      break;
+  }
+  return options;
+}
+
 void read_database(LinearSolverOptions& options) {
   constexpr std::array methods = {"block_triangular", "gamg", "gmres_ilu", "conjugate_residual", "direct"};
   constexpr std::array modes = {"automatic", "translations", "rigid"};

@@ -169,6 +169,74 @@ level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
         self.assertLess(summary(output)["accuracy"]["errors"]["level_set_l1_relative"], 0.08)
         self.assertAlmostEqual(history(output)[-1]["fill_fraction"], history(output)[0]["fill_fraction"], 9)
 
+    def test_fluid_at_rest_has_the_pressure_of_its_weight_up_to_the_corners(self):
+        for dim in (2, 3):
+            mesh = BoxMesh(dim)
+            mesh.add("box", [0.0] * dim, [1.0] * dim, [3] * dim)
+            mesh.write(self.directory / "box.msh")
+            walls = "".join(f"[wall.{a}{s}]\ngroup = box_{a}_{s}\n" for a in "xyz"[:dim] for s in ("low", "high"))
+            gravity = " ".join(["0"] * (dim - 1) + ["-9.81"])
+            text = (f"[mesh]\nfile = box.msh\n[time]\nincrements = 0\n[fluid.oil]\nviscosity = 1\ndensity = 900\n{walls}"
+                    f"[gravity]\nacceleration = {gravity}\n[reference]\npressure = \"-8829*{'xyz'[dim - 1]}\"\n")
+            for ranks in (1, 3):
+                with self.subTest(dim=dim, ranks=ranks):
+                    output = self.directory / "rest"
+                    run("inject", self.case(text), output, ranks=ranks)
+                    self.assertLess(summary(output)["accuracy"]["errors"]["pressure_l2_relative"], 1e-4)
+
+    def test_a_tube_as_a_section_that_turns_about_its_axis(self):
+        """dp/dx = 8 eta U / R^2; the axis may have a section or none."""
+        mesh = BoxMesh(2)
+        mesh.add("tube", [0.0, 0.0], [H, 6 * H], [8, 48])
+        mesh.write(self.directory / "tube.msh")
+        text = f"""[case]
+geometry = axisymmetric
+[mesh]
+file = tube.msh
+[time]
+increments = 0
+[fluid.polymer]
+viscosity = {ETA}
+[inlet.gate]
+group = tube_y_low
+fluid = polymer
+flow_rate = {np.pi * H ** 2 * U}
+[vent.outlet]
+group = tube_y_high
+[wall.pipe]
+group = tube_x_high
+[probe.first]
+point = 0 {2 * H}
+fields = pressure
+[probe.second]
+point = 0 {4 * H}
+fields = pressure
+"""
+        for axis in ("", "[symmetry.axis]\ngroup = tube_x_low\n"):
+            for method in ("block-triangular", "gmres-ilu"):
+                with self.subTest(axis=axis, method=method):
+                    output = self.directory / "tube"
+                    run("inject", self.case(text + axis + f"[solver]\nlinear_method = {method}\n"), output)
+                    drop = probe(output, "first", "pressure")[0] - probe(output, "second", "pressure")[0]
+                    self.assertLess(abs(drop / (8 * ETA * U / H ** 2 * 2 * H) - 1), 0.03)
+
+    def test_three_fluids_keep_their_volumes(self):
+        channel_mesh(self.directory / "channel.msh", 6)
+        text = CHANNEL + AIR + f"""[fluid.second]
+viscosity = {ETA / 10}
+[initial.drop]
+fluid = second
+shape = sphere
+center = {1.6 * H} {H / 2}
+radius = {0.3 * H}
+[time]
+end = 0.2
+"""
+        output = self.directory / "three"
+        run("inject", self.case(text), output, ranks=2)
+        for row in history(output):
+            self.assertLess(abs(row["volume_error"]), 1e-3)
+
     def test_wrong_cases_end_with_2_and_say_why(self):
         channel_mesh(self.directory / "channel.msh", 4)
         whole = CHANNEL + AIR
@@ -189,6 +257,7 @@ level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
                     ended = run("inject", self.case(whole.replace(*change, 1)), self.directory / "wrong", ranks=ranks, check=False)
                     self.assertEqual(ended.returncode, 2, ended.stderr)
                     self.assertIn(words, ended.stderr)
+                    self.assertRegex(ended.stderr, r"case\.ini")
 
 
 if __name__ == "__main__":
