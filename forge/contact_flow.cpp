@@ -1,5 +1,7 @@
 #include "forge/contact_flow.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -14,6 +16,8 @@ constexpr int most_passes = 12;         ///< of augmentation and friction limits
 constexpr int most_plans = 25;          ///< of a hydraulic press
 constexpr int tries_before_picard = 3;  ///< of an increment, each with half the step
 constexpr int most_picard_steps = 400;
+/// A step of a blow may be so many times as long as the force of the increment allows.
+constexpr Real tolerated_excess = 1.2;
 /// A node may end this share of an edge deeper in a tool than its linearised gap says.
 constexpr Real tolerated_surprise = 0.02;
 
@@ -105,6 +109,7 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
   stage.before.assign(velocity.begin(), velocity.end());
   if (const Outcome outcome = solve_under_presses(stage); outcome.kind != Outcome::Kind::done) return outcome;
 
+  if (const Outcome outcome = check_blows(increment.dt); outcome.kind != Outcome::Kind::done) return outcome;
   if (keeps_stress_) compute_stress(scene_, scene_.fields[field_name::stress].values());
   const Displacement& way = stage.displacement;
   scene_.step_velocity.resize(velocity.size());
@@ -116,6 +121,18 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
     scene_.step_strain_rate[e] = std::max(0.0, way.now * strain_rate[e] + way.before * last_rate[e]);
   }
   if (scheme == TimeScheme::runge_kutta_2 && scene_.progress.was_pushed) return run_midpoint(increment, stage);
+  return Outcome::done();
+}
+
+/// A blow must not spend energy that it does not have: the force of this increment may exceed the last one's by far.
+Outcome ContactFlow::check_blows(Real dt) const {
+  for (std::size_t t = 0; t < scene_.tools.size(); ++t) {
+    const Tool& tool = scene_.tools[t];
+    const Real limit = tool.press().step_limit(tool.resistance(report_.tool_forces[t]));
+    if (dt > tolerated_excess * limit) {
+      return Outcome::retry(fmt::format("the blow of {} would spend too much of its energy", tool.name()), limit);
+    }
+  }
   return Outcome::done();
 }
 

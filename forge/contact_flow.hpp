@@ -87,6 +87,7 @@ class ContactFlow final : public Component {
 
   void save();
   Outcome run_stages(const Increment& increment);
+  Outcome check_blows(Real dt) const;
   Outcome run_midpoint(const Increment& increment, const Stage& first);
   Outcome solve_under_presses(const Stage& stage);
   Outcome solve(const Stage& stage);

@@ -159,10 +159,8 @@ Real ForgeProcess::largest_step() {
   const Real edge_rate = flow_.largest_edge_rate() > 0 ? flow_.largest_edge_rate() : scene_->scale.rate();
   const Real strain_rate = flow_.largest_strain_rate() > 0 ? flow_.largest_strain_rate() : scene_->scale.rate();
   Real step = std::min({scene_->motion.edge_share / edge_rate, planned_strain() / strain_rate, volume_step()});
-  for (std::size_t t = 0; t < scene_->tools.size(); ++t) {
-    if (flow_.report().tool_forces.empty()) break;
-    const Tool& tool = scene_->tools[t];
-    step = std::min(step, tool.press().step_limit(tool.resistance(flow_.report().tool_forces[t])));
+  for (const Tool& tool : scene_->tools) {
+    step = std::min(step, tool.press().step_limit(tool.press().state().last_force));
   }
   if (case_.time.stroke && leading_stroke()) {
     const Real remaining = *case_.time.stroke - *leading_stroke();

@@ -11,8 +11,11 @@ namespace {
 
 /// A blow is over when this share of the starting speed is left (1e-6 of the energy).
 constexpr Real spent_speed = 1e-3;
-/// Largest relative change of the speed in a step of a hammer.
-constexpr Real speed_change = 0.1;
+/// Largest work of a step of a hammer: a share of the energy left, but not below a share of the blow's; near the end
+/// again a share of what is left.
+constexpr Real share_of_rest = 0.03;
+constexpr Real share_of_blow = 0.003;
+constexpr Real share_at_end = 0.36;  // a fifth of the speed
 /// A hydraulic press slower than this share of its full speed is not asked to meet its limit in more plans than so
 /// many.
 constexpr Real crawling = 1e-3;
@@ -163,7 +166,9 @@ void Press::commit(Real force, Real time, const Displacement& displacement) {
 
 Real Press::step_limit(Real force) const {
   if (!has_inertia() || state_.stopped || !(force > 0)) return std::numeric_limits<Real>::max();
-  return speed_change * spec_.mass * state_.speed / force;
+  const Real rest = 0.5 * spec_.mass * state_.speed * state_.speed;
+  const Real work = std::max(share_of_rest * rest, std::min(share_at_end * rest, share_of_blow * spec_.energy));
+  return work / (force * state_.speed);
 }
 
 }  // namespace malleus::forge

@@ -64,7 +64,7 @@ class Press {
   bool accepts(Real force, Real time, Real tolerance);
   /// Ends an increment. force: what resists the motion, N. Hammer and screw: m dw/dt = -force, by the nodes' scheme.
   void commit(Real force, Real time, const Displacement& displacement);
-  /// The largest step in which the speed still changes little [s].
+  /// The largest step in which a blow's work against the force [N] is a small part of its energy [s].
   Real step_limit(Real force) const;
 
  private:

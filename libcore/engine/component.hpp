@@ -27,10 +27,12 @@ struct Outcome {
   };
   Kind kind = Kind::done;
   std::string why;  ///< for the log: what failed, and where
+  Real step = 0;    ///< retry_smaller: the step to try, s; 0 = half of it
 
   static Outcome done() { return {}; }
-  static Outcome retry(std::string reason) { return {Kind::retry_smaller, std::move(reason)}; }
-  static Outcome fail(std::string reason) { return {Kind::failed, std::move(reason)}; }
+  static Outcome retry(std::string reason) { return {Kind::retry_smaller, std::move(reason), 0}; }
+  static Outcome retry(std::string reason, Real step) { return {Kind::retry_smaller, std::move(reason), step}; }
+  static Outcome fail(std::string reason) { return {Kind::failed, std::move(reason), 0}; }
 };
 
 /// The fields that a component touches, by name.

@@ -225,8 +225,9 @@ std::optional<std::string> Engine::make_increment() {
       return std::nullopt;
     }
     if (outcome.kind == Outcome::Kind::failed || cut == most_cuts) return outcome.why;
-    log::info("increment {}: {}; the step is cut to {:.3g} s", increment.number, outcome.why, increment.dt / 2);
-    increment.dt /= 2;
+    const bool tells_step = outcome.step > 0 && outcome.step < increment.dt;
+    increment.dt = tells_step ? outcome.step : increment.dt / 2;
+    log::info("increment {}: {}; the step is cut to {:.3g} s", increment.number, outcome.why, increment.dt);
     increment.time = last_.time + increment.dt;
   }
 }
@@ -240,7 +241,7 @@ Outcome Engine::try_increment(const Increment& increment) {
       continue;
     }
     for (auto undone = done.rbegin(); undone != done.rend(); ++undone) (*undone)->roll_back();
-    return {outcome.kind, component->name() + ": " + outcome.why};
+    return {outcome.kind, component->name() + ": " + outcome.why, outcome.step};
   }
   return Outcome::done();
 }

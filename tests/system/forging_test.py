@@ -173,6 +173,24 @@ class Upsetting(Forging):
         self.assertAlmostEqual(forces[1] / forces[0], 1, delta=1e-8)
 
 
+class Blow(Forging):
+    def test_a_hammer_spends_its_energy_and_no_more(self):
+        # Steps far too long for the blow are asked for. With m = 1 in plane strain F = 4 K v w0 h0 / h^2, so m dv/ds =
+        # -4 K w0 h0 / h^2 and the blow ends at 1/h = 1/h0 + m v0 / (4 K w0 h0), here with w0 = h0 = 1.
+        box_mesh(self.directory / "box.msh", 2, cells=(3, 3))
+        mass, speed = 1e6, 200.0
+        energy = 0.5 * mass * speed ** 2
+        text = case_text(1, 2, 1, "tools", time="stroke = 0.9\nstep = 1")
+        text = text.replace("velocity = 0 -1.0", f"velocity = 0 -1.0\npress = hammer\nmass = {mass}\nenergy = {energy}")
+        rows = self.forge(text, "-D", "output.every=1000")
+        self.assertIn("the presses came to rest", (self.directory / "out" / "run.log").read_text())
+        strokes = [0.0] + [row["stroke_upper_m"] for row in rows]
+        work = sum(row["force_upper_y_N"] * (b - a) for row, a, b in zip(rows, strokes, strokes[1:]))
+        self.assertAlmostEqual(work / energy, 1, delta=0.01)
+        height = 1 / (1 + mass * speed / (4 * K))
+        self.assertAlmostEqual(strokes[-1] / (1 - height), 1, delta=5e-3)
+
+
 class Stress(Forging):
     """2 eta eps - p I of the state that velocity, pressure and viscosity belong to, in outputs and at probes."""
     DIAGONAL, OTHERS = [0, 3, 5], [1, 2, 4]  # of xx xy xz yy yz zz
