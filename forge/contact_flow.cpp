@@ -259,6 +259,9 @@ void ContactFlow::find_points(const Stage& stage, const FreeSurface& surface) {
   contact_scene.shear_stress = shear_stress;
   contact_scene.memory = memory_;
   contact_scene.settings = scene_.contact;
+  if (scene_.fields.has(field_name::contact_pressure) && !scene_.comm->any(!memory_.empty())) {
+    contact_scene.last_pressure = std::as_const(scene_.fields)[field_name::contact_pressure].values();
+  }
   contact_.points() = find_contacts(*scene_.comm, contact_scene, predict(stage));
   std::vector<GlobalId> wanted;
   for (const ContactPoint& point : contact_.points()) {

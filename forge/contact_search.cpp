@@ -10,6 +10,8 @@ namespace {
 constexpr Real same_face = 0.8;
 /// Nodes nearer than this share of an edge at the start touch.
 constexpr Real touching = 1e-6;
+/// Nodes under pressure whose memory was lost hold where they are expected nearer than this share of an edge.
+constexpr Real near = 0.1;
 /// Parts of a node's area that face its opponent less than this share count as this share.
 constexpr Real least_area = 1e-3;
 
@@ -25,6 +27,13 @@ const ContactMemory* recall(const ContactScene& scene, LocalId slave, int oppone
     if (likeness > same_face && (best == nullptr || likeness > best->normal.dot(normal))) best = &*m;
   }
   return best;
+}
+
+/// Whether a node held, where only its pressure tells.
+bool held_before(const ContactScene& scene, LocalId slave, Real gap) {
+  if (scene.last_pressure.empty() || !(scene.last_pressure[static_cast<std::size_t>(slave)] > 0)) return false;
+  const BodyScale& body = scene.bodies[static_cast<std::size_t>(scene.surface->body_of_node(slave))];
+  return gap <= near * body.edge;
 }
 
 /// Normal, gap and the velocity of the guess relative to the opponent, which the linearised gap starts from.
@@ -50,7 +59,8 @@ ContactPoint make_point(const ContactScene& scene, std::size_t place, int oppone
   point.normal.penalty = scene.settings.penalty * body.viscosity / body.edge;
   const ContactMemory* memory = recall(scene, point.slave, opponent, meeting.normal);
   point.normal.multiplier = memory != nullptr ? memory->multiplier : 0;
-  point.holds = memory != nullptr || meeting.gap <= touching * body.edge;
+  point.holds =
+      memory != nullptr || meeting.gap <= touching * body.edge || held_before(scene, point.slave, meeting.gap);
   point.rubs = point.holds;
   return point;
 }
@@ -63,7 +73,9 @@ void set_friction(const ContactScene& scene, const FrictionSpec& spec, ContactPo
     return;
   }
   const ContactMemory* memory = recall(scene, point.slave, point.opponent, point.normal.normal);
-  const Real pressure = memory != nullptr ? memory->pressure : 0;
+  const bool is_lost = memory == nullptr && point.holds && !scene.last_pressure.empty();
+  const Real known = is_lost ? scene.last_pressure[static_cast<std::size_t>(point.slave)] : 0;
+  const Real pressure = memory != nullptr ? memory->pressure : known;
   const Real stress =
       scene.shear_stress.empty() ? unlimited : scene.shear_stress[static_cast<std::size_t>(point.slave)];
   point.friction = friction_term(spec, body.consistency, stress, pressure, scene.settings.slip_scale);

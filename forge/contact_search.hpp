@@ -59,6 +59,9 @@ struct ContactScene {
   std::span<const BodyScale> bodies;      ///< [region]
   std::span<const Real> shear_stress;     ///< [local node] of the last known state, Pa; may be empty: unlimited
   std::span<const ContactMemory> memory;  ///< sorted by slave, opponent
+  /// [local node] Pa, where the memory was lost (a restart, another mesh): nodes under pressure that are near an
+  /// opponent are taken to hold. Empty: the memory is right.
+  std::span<const Real> last_pressure;
   ContactSettings settings;
 };
 

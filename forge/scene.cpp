@@ -30,7 +30,7 @@ void declare_fields(Scene& scene) {
   declare(field_name::stress, "Pa", element, dim * (dim + 1) / 2, recompute);
   declare(field_name::quality, "1", element, 1, recompute);
   if (scene.tools.empty() && scene.pairs.empty()) return;
-  declare(field_name::contact_pressure, "Pa", node, 1, recompute);
+  declare(field_name::contact_pressure, "Pa", node, 1, interpolate, true);
   declare(field_name::contact_gap, "m", node, 1, recompute);
 }
 

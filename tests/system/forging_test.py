@@ -476,6 +476,17 @@ class Contact(Forging):
             for row in rows[1:]:
                 self.assertLessEqual(row["newton_iterations"], 6)
 
+    def test_a_restart_knows_the_contacts(self):
+        text = self.blocks(2, (4, 4), (7, 7), time="increments = 6\nstep = 0.02", consistency=3 * K)
+        text = text.replace("slave = upper\n", "slave = upper\nfriction = 1000\n")
+        whole = self.forge(text)
+        self.forge(text, "--steps", "3", ranks=2, name="parts")
+        rows = self.forge(text, "--restart", name="parts")
+        self.assertEqual(len(rows), 6)
+        for row, expected in zip(rows[3:], whole[3:]):
+            self.assertAlmostEqual(row["force_top_y_N"] / expected["force_top_y_N"], 1, delta=1e-5)
+            self.assertLessEqual(row["newton_iterations"], 6)
+
     def test_friction_between_bodies_balances(self):
         text = self.blocks(2, (4, 4), (6, 6), consistency=3 * K).replace("slave = upper\n", "slave = upper\nfriction = 1\n")
         row = self.forge(text)[0]
