@@ -228,7 +228,7 @@ class DistributedRemesher {
     const std::vector<std::uint8_t> shared = shared_nodes(mesh_);
     std::vector<std::uint8_t> held(shared.size(), 0);
     for (std::size_t node = 0; node < held.size(); ++node)
-      held[node] = shared[node] != 0 && distance[node] <= 1 ? 1 : 0;
+      held[node] = shared[node] != 0 && distance[node] == 0 ? 1 : 0;
     set_marks(held);
     remesh(selected, options_.local);
     // Marks of new nodes are interpolated: what was held keeps exactly 1 and its place among the shared nodes.

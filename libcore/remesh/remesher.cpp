@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <limits>
 
 #include "remesh/untangle.hpp"
 
@@ -182,9 +183,10 @@ void Remesher<D, Metric>::settle_sizes() {
   constexpr int most_last_rounds = 8;
   const Limits& limits = operators_.limits;
   int last_rounds = 0;
+  Real threshold = std::numeric_limits<Real>::max();
   for (int round = 0; round < options_.size_rounds && last_rounds < most_last_rounds; ++round) {
     const OperationCounts before = operators_.counts;
-    const Real threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
+    if (threshold > limits.long_edge) threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
     timed("split", [&] { split_pass(threshold); });
     timed("collapse", [&] { collapse_pass(0.9 * limits.short_edge); });
     timed("swap", [&] { swap_pass(quality_to_key<D>(0.63)); });
@@ -201,6 +203,7 @@ void Remesher<D, Metric>::settle_sizes() {
 
 template <int D, class Metric>
 void Remesher<D, Metric>::improve() {
+  operators_.limits.small_change = 0.05F;
   operators_.limits.large_change = 0.05F;
   enlist_all();
   for (int round = 0; round < options_.improvement_rounds; ++round) {
