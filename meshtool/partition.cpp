@@ -195,17 +195,17 @@ PartitionPlan release_plan(const Communicator& comm, const Mesh& mesh, const Par
   ReleaseOptions options;
   options.tolerance = command.options.tolerance;
   options.balanced = command.release == "balanced";
-  ReleaseReport report;
+  Release release = move_interfaces_inside(comm, mesh, work, architecture, from, options);
   PartitionPlan plan;
-  plan.parts = move_interfaces_inside(comm, mesh, work, architecture, from, options, &report);
+  plan.parts = std::move(release.parts);
   plan.seconds["divide"] = comm.max(std::chrono::duration<Real>(std::chrono::steady_clock::now() - start).count());
   const WorkGraph graph = build_work_graph(comm, mesh, work);
   plan.before = partition_cost(comm, mesh, graph, command.model, architecture, from);
   plan.after = partition_cost(comm, mesh, graph, command.model, architecture, plan.parts);
-  plan.moved_elements = report.moved_elements;
-  plan.moved = static_cast<Real>(report.moved_elements) / static_cast<Real>(mesh.total_elements);
-  plan.made_by =
-      fmt::format("release of {} of {} interface nodes", report.interface_nodes - report.still, report.interface_nodes);
+  plan.moved_elements = release.moved_elements;
+  plan.moved = static_cast<Real>(release.moved_elements) / static_cast<Real>(mesh.total_elements);
+  plan.made_by = fmt::format("release of {} of {} interface nodes", release.interface_nodes - release.still,
+                             release.interface_nodes);
   return plan;
 }
 

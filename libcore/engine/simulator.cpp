@@ -142,7 +142,7 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
   reader.check_mesh(names);
   if (common.partition.method == PartitionMethod::cost && comm.size() > 1) {
-    log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, {}, true)));
+    log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, solver_work(), true)));
   }
   RunSettings settings = run_settings(line, simulator);
   try {

@@ -281,59 +281,59 @@ std::vector<int> level(const Communicator& comm, const WorkGraph& graph, const A
   return parts;
 }
 
-ReleaseReport make_report(const Communicator& comm, const Mesh& mesh, const WorkGraph& graph,
-                          const Architecture& architecture, std::span<const std::int32_t> old_marks,
-                          std::span<const int> before, std::span<const int> after) {
-  ReleaseReport report;
-  const SplitNodes split = find_split_nodes(comm, mesh, after);
+/// Counts what is new in release.parts against the parts before. Collective.
+void count_release(const Communicator& comm, const Mesh& mesh, std::span<const std::int32_t> old_marks,
+                   std::span<const int> before, Release& release) {
+  const SplitNodes split = find_split_nodes(comm, mesh, release.parts);
   GlobalId still = 0;
   for (const LocalId node : split.nodes) still += old_marks[static_cast<std::size_t>(node)];
-  report.still = comm.sum(still);
+  release.still = comm.sum(still);
   const auto owned = old_marks.first(static_cast<std::size_t>(mesh.owned_nodes()));
-  report.interface_nodes = comm.sum(std::accumulate(owned.begin(), owned.end(), GlobalId{0}));
+  release.interface_nodes = comm.sum(std::accumulate(owned.begin(), owned.end(), GlobalId{0}));
   GlobalId moved = 0;
-  for (std::size_t e = 0; e < after.size(); ++e) moved += before[e] != after[e] ? 1 : 0;
-  report.moved_elements = comm.sum(moved);
-  const std::vector<Real> excess = excess_of_parts(comm, graph, architecture, after);
+  for (std::size_t e = 0; e < before.size(); ++e) moved += before[e] != release.parts[e] ? 1 : 0;
+  release.moved_elements = comm.sum(moved);
+}
+
+Real imbalance_of(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                  std::span<const int> parts) {
+  const std::vector<Real> excess = excess_of_parts(comm, graph, architecture, parts);
   const Real total = comm.sum(std::accumulate(graph.weights.begin(), graph.weights.end(), Real{0}));
+  Real worst = 0;
   for (std::size_t p = 0; p < excess.size(); ++p) {
-    report.imbalance =
-        std::max(report.imbalance, excess[p] * architecture.total_speed() / (total * architecture.speed[p]));
+    worst = std::max(worst, excess[p] * architecture.total_speed() / (total * architecture.speed[p]));
   }
-  return report;
+  return worst;
 }
 
 }  // namespace
 
-std::vector<int> move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
-                                        const Architecture& architecture, std::span<const int> parts,
-                                        const ReleaseOptions& options, ReleaseReport* report) {
+Release move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                               const Architecture& architecture, std::span<const int> parts,
+                               const ReleaseOptions& options) {
   WorkGraph graph = build_work_graph(comm, mesh, work);
   const SplitNodes split = find_split_nodes(comm, mesh, parts);
   const std::vector<std::int32_t> marks = mark_split_nodes(mesh, split);
   const AroundNodes around = spread_split_nodes(comm, mesh, split);
-  std::vector<int> released;
+  Release release;
   if (options.balanced) {
     const Directions directions(weigh_layers(comm, mesh, graph, around, parts),
                                 excess_of_parts(comm, graph, architecture, parts));
-    released = shift_by_directions(mesh, around, directions, parts);
     weigh_old_borders(mesh, marks, graph);
-    released = level(comm, graph, architecture, std::move(released), options.tolerance);
+    release.parts =
+        level(comm, graph, architecture, shift_by_directions(mesh, around, directions, parts), options.tolerance);
   } else {
-    released = shift_by_a_layer(mesh, draw_winners(mesh, around, options.round), parts, options.round);
+    release.parts = shift_by_a_layer(mesh, draw_winners(mesh, around, options.round), parts, options.round);
   }
-  const bool is_asked = comm.any(report != nullptr);
-  if (is_asked) {
-    const ReleaseReport made = make_report(comm, mesh, graph, architecture, marks, parts, released);
-    if (report != nullptr) *report = made;
-  }
-  return released;
+  count_release(comm, mesh, marks, parts, release);
+  release.imbalance = imbalance_of(comm, graph, architecture, release.parts);
+  return release;
 }
 
-std::vector<int> move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
-                                        const ReleaseOptions& options, ReleaseReport* report) {
+Release move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                               const ReleaseOptions& options) {
   const std::vector<int> here(static_cast<std::size_t>(mesh.elements()), comm.rank());
-  return move_interfaces_inside(comm, mesh, work, equal_architecture(comm.size()), here, options, report);
+  return move_interfaces_inside(comm, mesh, work, equal_architecture(comm.size()), here, options);
 }
 
 }  // namespace malleus

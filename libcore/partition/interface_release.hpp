@@ -17,7 +17,9 @@ struct ReleaseOptions {
   bool balanced = true;   ///< false: only the shift by a layer, which moves less and leaves the loads uneven
 };
 
-struct ReleaseReport {
+/// The new parts, and what came out over all ranks.
+struct Release {
+  std::vector<int> parts;        ///< [element] of this rank
   GlobalId interface_nodes = 0;  ///< nodes between parts before
   GlobalId still = 0;            ///< of these, those between parts afterwards
   GlobalId moved_elements = 0;
@@ -27,13 +29,13 @@ struct ReleaseReport {
 /// A part for each element such that few of the nodes between the present parts lie between the new ones. At each such
 /// node one of the parts around takes over the elements around it; then loads are levelled by moves along borders that
 /// avoid the old ones. work: [element] as the next pass will find it (predicted elements, say); parts: [element] in
-/// [0, architecture.parts()). report: what came out, or null. Elements far from borders stay. Collective.
-std::vector<int> move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
-                                        const Architecture& architecture, std::span<const int> parts,
-                                        const ReleaseOptions& options, ReleaseReport* report = nullptr);
+/// [0, architecture.parts()). Elements far from borders stay. Collective.
+Release move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                               const Architecture& architecture, std::span<const int> parts,
+                               const ReleaseOptions& options);
 
-/// The same where each rank is a part: destinations of this rank's elements for migrate(). Collective.
-std::vector<int> move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
-                                        const ReleaseOptions& options, ReleaseReport* report = nullptr);
+/// The same where each rank is a part: the parts are destinations for migrate(). Collective.
+Release move_interfaces_inside(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                               const ReleaseOptions& options);
 
 }  // namespace malleus

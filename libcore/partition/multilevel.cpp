@@ -18,35 +18,15 @@ constexpr int band_depth = 2;
 constexpr std::size_t most_levels = 30;
 constexpr Real least_shrinking = 0.95;
 
+std::vector<int> owned_parts(const WorkGraph& graph, std::vector<int> parts) {
+  parts.resize(static_cast<std::size_t>(graph.owned()));
+  return parts;
+}
+
 std::vector<int> with_copies(const WorkGraph& graph, std::vector<int> parts) {
   parts.resize(static_cast<std::size_t>(graph.vertices()));
   graph.halo.update_copies(std::span<std::int32_t>(parts), 1);
   return parts;
-}
-
-/// Coarser graphs of the given one, to about `enough` vertices; parts become those of the coarsest's owned vertices.
-std::vector<CoarseGraph> make_levels(const Communicator& comm, const WorkGraph& finest, std::vector<int>& parts,
-                                     const std::vector<Real>& targets, GlobalId enough,
-                                     const MultilevelSettings& settings) {
-  const Real total = std::accumulate(targets.begin(), targets.end(), Real{0});
-  const auto n_parts = static_cast<GlobalId>(targets.size());
-  const Real heaviest = std::max(1.0, total / (1.5 * settings.vertices_per_part * static_cast<Real>(n_parts)));
-  std::vector<CoarseGraph> levels;
-  const WorkGraph* graph = &finest;
-  levels.reserve(most_levels);
-  while (levels.size() < most_levels && graph->ownership.total() > enough) {
-    CoarseGraph coarse = coarsen(comm, *graph, with_copies(*graph, parts), heaviest);
-    const auto shrunk = static_cast<Real>(coarse.graph.ownership.total());
-    if (shrunk > least_shrinking * static_cast<Real>(graph->ownership.total())) break;
-    std::vector<int> coarse_parts(coarse.graph.weights.size());
-    for (std::size_t v = 0; v < coarse.coarse_of.size(); ++v) {
-      coarse_parts[static_cast<std::size_t>(coarse.coarse_of[v])] = parts[v];
-    }
-    parts = std::move(coarse_parts);
-    levels.push_back(std::move(coarse));
-    graph = &levels.back().graph;
-  }
-  return levels;
 }
 
 Real heaviest_vertex(const Communicator& comm, const WorkGraph& graph) {
@@ -55,77 +35,111 @@ Real heaviest_vertex(const Communicator& comm, const WorkGraph& graph) {
   return comm.max(heaviest);
 }
 
-/// Improves one level.
-std::vector<int> refine_level(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                              std::vector<int> parts, const std::vector<Real>& targets, Real tolerance,
-                              bool is_coarsest, const RefinementSettings& settings) {
-  PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
-  if (is_coarsest || refiner.imbalance() > tolerance) {
-    refiner.diffuse(0.6 * tolerance, is_coarsest ? 30 : 6);
-    refiner.tidy(0.6 * tolerance);
+/// Graphs from the given one to the coarsest, and back.
+class Multilevel {
+ public:
+  Multilevel(const Communicator& comm, const Architecture& architecture, const std::vector<Real>& targets,
+             const MultilevelSettings& settings)
+      : comm_(comm), architecture_(architecture), targets_(targets), settings_(settings) {
+    few_ = few_vertices + settings.vertices_per_part * static_cast<GlobalId>(targets.size());
   }
-  refiner.smooth(tolerance, settings);
-  parts = std::move(refiner).take_parts();
-  parts.resize(static_cast<std::size_t>(graph.owned()));
-  return parts;
-}
 
-/// The same on every rank by itself, for graphs of few vertices.
-std::vector<int> refine_replicated(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                                   const std::vector<int>& parts, const std::vector<Real>& targets,
-                                   const MultilevelSettings& settings) {
-  const Communicator alone(MPI_COMM_SELF);
-  const WorkGraph whole = replicate_graph(comm, alone, graph);
-  const std::vector<int> refined =
-      refine_multilevel(alone, whole, architecture, gather_lists<int>(comm, parts), targets, settings);
-  const auto first = refined.begin() + graph.ownership.begin();
-  return {first, first + graph.owned()};
-}
-
-std::vector<int> refine_finest(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                               std::vector<int> parts, const std::vector<Real>& targets, int rounds,
-                               const MultilevelSettings& settings) {
-  PairRefiner refiner(comm, graph, architecture, with_copies(graph, std::move(parts)), targets);
-  refiner.diffuse(0.9 * settings.tolerance, rounds);
-  refiner.smooth(settings.tolerance, {settings.fine_passes, band_depth, 2, 300});
-  for (int sweep = 0; sweep < 3 && refiner.tidy(settings.tolerance); ++sweep) {
-    refiner.smooth(settings.tolerance, {1, band_depth, 1, 100});
+  std::vector<int> refine(const WorkGraph& finest, std::vector<int> parts) const {
+    if (is_copied_to_all(finest)) return refine_copied(finest, parts, settings_);
+    const std::vector<CoarseGraph> levels = make_levels(finest, parts);
+    const Real smallest = *std::min_element(targets_.begin(), targets_.end());
+    for (std::size_t level = levels.size(); level > 0; --level) {
+      const WorkGraph& graph = levels[level - 1].graph;
+      const Real grain = smallest > 0 ? heaviest_vertex(comm_, graph) / smallest : 0;
+      MultilevelSettings here = settings_;
+      here.tolerance = std::clamp(1.5 * grain, settings_.tolerance, std::max(settings_.tolerance, 0.03));
+      const bool is_coarsest = level == levels.size();
+      parts = is_coarsest && is_copied_to_all(graph)
+                  ? refine_copied(graph, parts, here)
+                  : refine_coarse(graph, std::move(parts), here.tolerance, is_coarsest);
+      const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
+      std::vector<int> finer(coarse_of.size());
+      for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
+      parts = std::move(finer);
+    }
+    return refine_finest(finest, std::move(parts), levels.empty() ? most_flow_rounds : few_flow_rounds);
   }
-  parts = std::move(refiner).take_parts();
-  parts.resize(static_cast<std::size_t>(graph.owned()));
-  return parts;
-}
+
+ private:
+  static constexpr int most_flow_rounds = 30;
+  static constexpr int few_flow_rounds = 6;
+
+  bool is_copied_to_all(const WorkGraph& graph) const { return comm_.size() > 1 && graph.ownership.total() <= few_; }
+
+  /// Ever coarser graphs; parts become those of the coarsest's owned vertices.
+  std::vector<CoarseGraph> make_levels(const WorkGraph& finest, std::vector<int>& parts) const {
+    const Real total = std::accumulate(targets_.begin(), targets_.end(), Real{0});
+    const auto n_parts = static_cast<GlobalId>(targets_.size());
+    const GlobalId enough = comm_.size() > 1 ? few_ : settings_.vertices_per_part * n_parts;
+    const Real heaviest = std::max(1.0, total / (1.5 * settings_.vertices_per_part * static_cast<Real>(n_parts)));
+    std::vector<CoarseGraph> levels;
+    levels.reserve(most_levels);  // references to the graphs stay valid
+    const WorkGraph* graph = &finest;
+    while (levels.size() < most_levels && graph->ownership.total() > enough) {
+      CoarseGraph coarse = coarsen(comm_, *graph, with_copies(*graph, parts), heaviest);
+      const auto shrunk = static_cast<Real>(coarse.graph.ownership.total());
+      if (shrunk > least_shrinking * static_cast<Real>(graph->ownership.total())) break;
+      std::vector<int> coarse_parts(coarse.graph.weights.size());
+      for (std::size_t v = 0; v < coarse.coarse_of.size(); ++v) {
+        coarse_parts[static_cast<std::size_t>(coarse.coarse_of[v])] = parts[v];
+      }
+      parts = std::move(coarse_parts);
+      levels.push_back(std::move(coarse));
+      graph = &levels.back().graph;
+    }
+    return levels;
+  }
+
+  std::vector<int> refine_coarse(const WorkGraph& graph, std::vector<int> parts, Real tolerance,
+                                 bool is_coarsest) const {
+    PairRefiner refiner(comm_, graph, architecture_, with_copies(graph, std::move(parts)), targets_);
+    if (is_coarsest || refiner.imbalance() > tolerance) {
+      refiner.diffuse(0.6 * tolerance, is_coarsest ? most_flow_rounds : few_flow_rounds);
+      refiner.tidy(0.6 * tolerance);
+    }
+    refiner.smooth(tolerance, {settings_.coarse_passes, band_depth, 2, 200});
+    return owned_parts(graph, std::move(refiner).take_parts());
+  }
+
+  std::vector<int> refine_finest(const WorkGraph& graph, std::vector<int> parts, int flow_rounds) const {
+    PairRefiner refiner(comm_, graph, architecture_, with_copies(graph, std::move(parts)), targets_);
+    refiner.diffuse(0.9 * settings_.tolerance, flow_rounds);
+    refiner.smooth(settings_.tolerance, {settings_.fine_passes, band_depth, 2, 300});
+    for (int sweep = 0; sweep < 3 && refiner.tidy(settings_.tolerance); ++sweep) {
+      refiner.smooth(settings_.tolerance, {1, band_depth, 1, 100});
+    }
+    return owned_parts(graph, std::move(refiner).take_parts());
+  }
+
+  /// The same on every rank by itself, for graphs of few vertices.
+  std::vector<int> refine_copied(const WorkGraph& graph, const std::vector<int>& parts,
+                                 const MultilevelSettings& settings) const {
+    const Communicator alone(MPI_COMM_SELF);
+    const WorkGraph whole = replicate_graph(comm_, alone, graph);
+    const std::vector<int> refined =
+        refine_multilevel(alone, whole, architecture_, gather_lists<int>(comm_, parts), targets_, settings);
+    const auto first = refined.begin() + graph.ownership.begin();
+    return {first, first + graph.owned()};
+  }
+
+  const Communicator& comm_;
+  const Architecture& architecture_;
+  const std::vector<Real>& targets_;
+  const MultilevelSettings& settings_;
+  GlobalId few_;  ///< vertices up to which a graph is copied to all ranks
+};
 
 }  // namespace
 
 std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
                                    std::vector<int> parts, const std::vector<Real>& targets,
                                    const MultilevelSettings& settings) {
-  const GlobalId few = few_vertices + settings.vertices_per_part * static_cast<GlobalId>(targets.size());
-  if (comm.size() > 1 && graph.ownership.total() <= few) {
-    return refine_replicated(comm, graph, architecture, parts, targets, settings);
-  }
-  const GlobalId enough = comm.size() > 1 ? few : settings.vertices_per_part * static_cast<GlobalId>(targets.size());
-  const std::vector<CoarseGraph> levels = make_levels(comm, graph, parts, targets, enough, settings);
-  const Real smallest = *std::min_element(targets.begin(), targets.end());
-  for (std::size_t level = levels.size(); level > 0; --level) {
-    const WorkGraph& coarse = levels[level - 1].graph;
-    const bool is_coarsest = level == levels.size();
-    const Real grain = smallest > 0 ? heaviest_vertex(comm, coarse) / smallest : 0;
-    MultilevelSettings here = settings;
-    here.tolerance = std::clamp(1.5 * grain, settings.tolerance, std::max(settings.tolerance, 0.03));
-    if (is_coarsest && comm.size() > 1 && coarse.ownership.total() <= few) {
-      parts = refine_replicated(comm, coarse, architecture, parts, targets, here);
-    } else {
-      parts = refine_level(comm, coarse, architecture, std::move(parts), targets, here.tolerance, is_coarsest,
-                           {settings.coarse_passes, band_depth, 2, 200});
-    }
-    const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
-    std::vector<int> finer(coarse_of.size());
-    for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
-    parts = std::move(finer);
-  }
-  return refine_finest(comm, graph, architecture, std::move(parts), targets, levels.empty() ? 30 : 6, settings);
+  return Multilevel(comm, architecture, targets, settings).refine(graph, std::move(parts));
 }
 
 }  // namespace malleus

@@ -39,7 +39,7 @@ class DistributedRemesher {
     remesh_strips();
     timed("balance", [&] {
       balance_along_curve(comm_, mesh_, fields_);
-      if (options_.balances_by_cost) balance_by_cost(comm_, mesh_, fields_, {}, false);
+      if (options_.balances_by_cost) balance_by_cost(comm_, mesh_, fields_, solver_work(), false);
     });
     timed("report", [&] { report_.after = metric_fit(comm_, mesh_, metric()); });
     if (fields_.has(metric_field_name)) fields_.remove(metric_field_name);

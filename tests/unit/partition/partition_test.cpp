@@ -204,15 +204,16 @@ TEST_P(Partitions, BordersMoveInside) {
   const std::vector<Real> work(static_cast<std::size_t>(mesh.elements()), 1);
   ReleaseOptions options;
   options.balanced = false;
-  ReleaseReport report;
-  const std::vector<int> shifted = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options, &report);
-  expect_parts(mesh, shifted, 4);
-  EXPECT_GT(report.interface_nodes, 0);
-  EXPECT_LE(report.still, report.interface_nodes / 5);
+  const Release shifted = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options);
+  expect_parts(mesh, shifted.parts, 4);
+  EXPECT_GT(shifted.interface_nodes, 0);
+  EXPECT_LE(shifted.still, shifted.interface_nodes / 5);
+  EXPECT_LT(shifted.moved_elements, mesh.total_elements / 2);
   options.balanced = true;
-  move_interfaces_inside(world(), mesh, work, machine, plan.parts, options, &report);
-  EXPECT_LE(report.imbalance, 0.1);
-  EXPECT_LE(report.still, report.interface_nodes / 2);
+  const Release balanced = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options);
+  EXPECT_LE(balanced.imbalance, 0.1);
+  EXPECT_LE(balanced.still, balanced.interface_nodes / 2);
+  expect_parts(mesh, move_interfaces_inside(world(), mesh, work, options).parts, world().size());
 }
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, Partitions, testing::Values(2, 3));
