@@ -10,6 +10,7 @@ import unittest
 import h5py
 
 import small_meshes
+from runs import history, run
 
 MESHTOOL = pathlib.Path(os.environ["MALLEUS_BIN"]) / "meshtool"
 
@@ -143,6 +144,50 @@ class Probe(Partitions):
         self.assertIn("[architecture]", machine.read_text())
         report, _ = self.partition(self.mesh(3, 4), 3, "--architecture", machine)
         self.assertEqual(report["parts"], 3)
+
+
+class Runs(Partitions):
+    """[partition] in a case: the same answer, shared otherwise."""
+
+    CASE = """[mesh]
+file = mesh.msh
+[time]
+increments = 2
+step = 1e-3
+[body.billet]
+group = body
+law = norton-hoff
+consistency = 1e8
+rate_sensitivity = 0.5
+[tool.upper]
+shape = plane
+point = 0 0 1
+normal = 0 0 -1
+velocity = 0 0 -1
+[tool.lower]
+shape = plane
+point = 0 0 0
+normal = 0 0 1
+"""
+
+    def case(self, partition):
+        self.mesh(3, 4)
+        return self.put("case.ini", self.CASE + "[partition]\n" + partition + "\n")
+
+    def test_shares_by_cost_give_the_same_force(self):
+        forces = []
+        for method, ranks in (("curve", 1), ("cost", 1), ("cost", 3)):
+            output = self.folder / f"{method}{ranks}"
+            result = run("forge", self.case(f"method = {method}"), output, ranks=ranks)
+            self.assertEqual("shares by" in result.stdout, method == "cost" and ranks > 1)
+            forces.append(history(output)[-1]["force_upper_z_N"])
+        for force in forces[1:]:
+            self.assertAlmostEqual(force / forces[0], 1, places=4)
+
+    def test_choices_that_are_not_there_are_refused(self):
+        for choice in ("method = scotch", "balance = measured"):
+            result = run("forge", self.case(choice), self.folder / "out", check=False)
+            self.assert_refused(result, "[partition]", choice.split()[-1])
 
 
 if __name__ == "__main__":
