@@ -12,6 +12,9 @@ namespace {
 constexpr Real full = 0.999;
 /// Of what enters in an increment, the share that must stay for the filling to go on.
 constexpr Real smallest_gain = 0.02;
+/// Of the cavity, the air before open vents below which they count as closed: what is left are last corners of vents,
+/// through which nothing but pressure would come.
+constexpr Real last_corners = 5e-4;
 
 }  // namespace
 
@@ -28,7 +31,10 @@ Outcome Filling::advance(const Increment& increment) {
   stands_still_ = entered > 0 && filled > 0.5 * scene_.cavity && gain < smallest_gain * entered;
   state_.filled = std::min(filled, scene_.cavity);
   const bool has_vents = !scene_.settings.vents.empty();
-  state_.is_closed = has_vents && !fronts_.has_way_out();
+  pockets_ = find_air_pockets(scene_, fronts_);
+  Real vented = 0;
+  for (const AirPocket& pocket : pockets_) vented += pocket.is_vented ? pocket.volume : 0;
+  state_.is_closed = has_vents && (!fronts_.has_way_out() || vented < last_corners * scene_.cavity);
   return Outcome::done();
 }
 
@@ -44,13 +50,30 @@ Real Filling::unfilled() const {
   return fronts_.size() == 0 ? 0 : std::max(0.0, scene_.cavity - state_.filled);
 }
 
+std::string Filling::largest_pocket() const {
+  if (pockets_.empty()) return "";
+  const AirPocket& largest = pockets_.front();
+  return fmt::format(", the largest part, {:.4g} m^3, around ({:.4g}, {:.4g}, {:.4g}) m", largest.volume,
+                     largest.place[0], largest.place[1], largest.place[2]);
+}
+
+/// Larger than an element: smaller ones are what the mesh does not resolve.
+std::vector<AirPocket> Filling::trapped_air() const {
+  std::vector<AirPocket> trapped;
+  const Real element = scene_.cavity / static_cast<Real>(std::max<GlobalId>(1, scene_.mesh.total_elements));
+  for (const AirPocket& pocket : pockets_) {
+    if (pocket.volume > element && (!pocket.is_vented || state_.is_closed)) trapped.push_back(pocket);
+  }
+  return trapped;
+}
+
 std::optional<std::string> Filling::finished() const {
   if (fronts_.size() == 0 || scene_.settings.inlets.empty()) return std::nullopt;
   const Real element = scene_.cavity / static_cast<Real>(std::max<GlobalId>(1, scene_.mesh.total_elements));
   if (fill_fraction() >= full || unfilled() < element) return "cavity full";
   if (state_.is_closed) {
-    return fmt::format("short shot: the vents are covered, {:.4g} m^3 of what was in the cavity stay in it",
-                       unfilled());
+    return fmt::format("short shot: the vents are covered, {:.4g} m^3 of what was in the cavity stay in it{}",
+                       unfilled(), largest_pocket());
   }
   if (stands_still_) {
     return fmt::format("short shot: what enters leaves through the vents, {:.4g} m^3 stay unfilled", unfilled());

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "engine/component.hpp"
+#include "inject/air_pockets.hpp"
 #include "inject/filling_state.hpp"
 #include "inject/front_set.hpp"
 
@@ -27,14 +28,19 @@ class Filling final : public Component {
   Real volume_error() const;
   /// Volume [m^3] that is not filled, 0 where the scene has no front.
   Real unfilled() const;
+  /// Air that has no way to an opening, largest first, as of the last increment.
+  std::vector<AirPocket> trapped_air() const;
   /// "cavity full", "short shot: ...": nothing more happens.
   std::optional<std::string> finished() const;
 
  private:
+  std::string largest_pocket() const;
+
   Scene& scene_;
   FrontSet& fronts_;
   FillingState& state_;
   FillingState before_;
+  std::vector<AirPocket> pockets_;
   bool stands_still_ = false;
 };
 

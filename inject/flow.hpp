@@ -41,6 +41,7 @@ class Flow final : public Component {
   std::vector<GateDrive> present_drives(Real time);
   bool is_due(const std::vector<GateDrive>& drives);
   bool dissipation_changed();
+  void refuse_blocked_vents() const;
   Outcome solve(Real time);
   Outcome solve_with(const std::vector<GateDrive>& drives, Real time);
   /// Makes the operator ready; returns the inlet of each flow-rate gate.

@@ -19,6 +19,9 @@ namespace {
 
 constexpr Real not_filled = -1;
 constexpr int most_turns = 12;  ///< of parting fronts and restoring their volumes
+/// Substeps follow the fastest fluid at the front up to so many times the front's own rate: beyond are a few small
+/// elements that it squeezes through, where longer steps do no harm to the rest.
+constexpr Real most_over_front = 4;
 /// Marks of facets through which the fluid's share of the flow is known: 0, 1, or none of it passes.
 constexpr signed char by_level_set = -1;
 constexpr signed char sealed = 2;
@@ -69,7 +72,7 @@ void Front::rebuild() {
   const FrontSettings& front = scene_.settings.front;
   TransportOptions options;
   options.stabilization = front.stabilization();
-  options.front_cfl = front.cfl;
+  options.front_cfl = renew_velocity_ ? front.cfl : most_over_front * front.cfl;  // of what substep_rate() leaves
   options.narrow_band = front.narrow_band.value_or(0);
   transport_ = std::make_unique<LevelSetTransport>(scene_.comm, scene_.mesh, scene_.graph, options);
   wetting_ = std::make_unique<WallWetting>(scene_.comm, scene_.mesh, scene_.graph, wetted_nodes());
@@ -153,6 +156,11 @@ Real Front::crossing_rate() const {
   return rate;
 }
 
+Real Front::substep_rate() {
+  const Real fastest = rate();
+  return renew_velocity_ ? fastest : std::min(fastest, most_over_front * crossing_rate());
+}
+
 Outcome Front::advance(const Increment& increment) {
   snapshot();
   substeps_ = 0;
@@ -160,7 +168,7 @@ Outcome Front::advance(const Increment& increment) {
   while (left > 0) {
     const Real start = increment.time - left;
     if (renew_velocity_) renew_velocity_(start);
-    const Real fastest = rate();
+    const Real fastest = substep_rate();
     const Real wanted = std::ceil(left * fastest / scene_.settings.front.cfl - 1e-6);
     const int parts = static_cast<int>(std::clamp(wanted, 1.0, 1e6));
     const Real dt = left / parts;

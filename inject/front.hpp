@@ -60,6 +60,7 @@ class Front final : public Component {
   std::vector<char> kept_apart(std::size_t front) const;
   void restore_volumes();
   void warn_of_backflow();
+  Real substep_rate();
   Outcome substep(Real start, Real dt);
   void mark_fill_time(const std::vector<Real>& before, Real start, Real dt);
   std::vector<Real> union_of_fronts() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "mesh/node_regions.hpp"
 #include "mesh/space_filling_curve.hpp"
 #include "solvers/facet_distance.hpp"
 
@@ -109,17 +110,56 @@ bool FrontSet::is_near_open_vent(Real distance) const {
   return scene_.comm.any(is_near);
 }
 
-bool FrontSet::has_way_out() const {
-  const std::vector<char> sealed = sealed_vent_nodes();
-  const std::vector<char> walls = sticking_walls(scene_);
-  bool is_open = false;
-  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::vent)) {
-    for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
-      const auto n = static_cast<std::size_t>(node);
-      is_open = is_open || (part->normals->holds(node) && sealed[n] == 0 && walls[n] == 0);
+/// Flow goes from element to element through nodes that can move: the regions of such nodes that inlets reach; of
+/// all, where there is no inlet.
+std::vector<char> FrontSet::reached_by_flow(const std::vector<char>& held) const {
+  const Mesh& mesh = scene_.mesh;
+  std::vector<LocalId> moving;
+  const NodeRegions regions = connected_regions(scene_.comm, mesh, [&](LocalId element) {
+    moving.clear();
+    for (const LocalId node : mesh.nodes_of_element(element)) {
+      if (held[static_cast<std::size_t>(node)] == 0) moving.push_back(node);
+    }
+    return std::span<const LocalId>(moving);
+  });
+  const std::vector<const BoundaryPart*> inlets = scene_.parts_of(BoundaryPart::Kind::inlet);
+  std::vector<char> reached(held.size(), 1);
+  if (inlets.empty() || !regions.is_complete) return reached;
+  std::vector<Real> has_inlet(static_cast<std::size_t>(regions.count), 0);
+  for (const BoundaryPart* part : inlets) {
+    for (std::size_t n = 0; n < held.size(); ++n) {
+      const std::int32_t region = regions.of_node[n];
+      if (region >= 0 && part->normals->holds(static_cast<LocalId>(n))) has_inlet[static_cast<std::size_t>(region)] = 1;
     }
   }
-  return scene_.comm.any(is_open);
+  scene_.comm.max_in_place(std::span(has_inlet));
+  for (std::size_t n = 0; n < held.size(); ++n) {
+    const std::int32_t region = regions.of_node[n];
+    reached[n] = region >= 0 && has_inlet[static_cast<std::size_t>(region)] > 0;
+  }
+  return reached;
+}
+
+std::vector<char> FrontSet::ways_out() const {
+  std::vector<char> held = sealed_vent_nodes();
+  const std::vector<char> walls = sticking_walls(scene_);
+  for (std::size_t n = 0; n < held.size(); ++n) held[n] = held[n] != 0 || walls[n] != 0;
+  const std::vector<char> reached = reached_by_flow(held);
+  std::vector<char> open(held.size(), 0);
+  for (const BoundaryPart& part : scene_.parts) {
+    const bool is_imposed = part.kind == BoundaryPart::Kind::imposed &&
+                            scene_.settings.common.boundaries[part.index].type != BoundarySettings::Type::symmetry;
+    if (part.kind != BoundaryPart::Kind::vent && !is_imposed) continue;
+    for (std::size_t n = 0; n < held.size(); ++n) {
+      if (part.normals->holds(static_cast<LocalId>(n)) && held[n] == 0 && reached[n] != 0) open[n] = 1;
+    }
+  }
+  return open;
+}
+
+bool FrontSet::has_way_out() const {
+  const std::vector<char> open = ways_out();
+  return scene_.comm.any(std::any_of(open.begin(), open.end(), [](char is_open) { return is_open != 0; }));
 }
 
 bool FrontSet::part() {

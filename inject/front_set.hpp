@@ -30,6 +30,10 @@ class FrontSet {
   std::vector<char> sealed_vent_nodes() const;
   /// Whether a front is within a distance [m] of a part of a vent that it will close. Collective.
   bool is_near_open_vent(Real distance) const;
+  /// Nodes through which fluid can leave: of vents that are not closed there and of boundaries that the case moves,
+  /// where the flow from the inlets reaches them through nodes that can move (sections one element thin let nothing
+  /// through): [node]. Collective.
+  std::vector<char> ways_out() const;
   /// Whether air, or a fluid under a given pressure, can still leave or enter. Collective.
   bool has_way_out() const;
 
@@ -45,6 +49,7 @@ class FrontSet {
   std::vector<Real> behind_inlets(int fluid) const;
   bool is_filled(LocalId node) const;
   void choose_seals();
+  std::vector<char> reached_by_flow(const std::vector<char>& held) const;
 
   Scene& scene_;
   std::vector<int> fluids_;

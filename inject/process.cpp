@@ -239,6 +239,12 @@ nlohmann::json FillingProcess::known_errors() {
 nlohmann::json FillingProcess::accuracy() {
   nlohmann::json json = nlohmann::json::object();
   json["volume_error"] = filling_ ? filling_->volume_error() : 0;
+  if (filling_) {
+    json["trapped_air"] = nlohmann::json::array();
+    for (const AirPocket& pocket : filling_->trapped_air()) {
+      json["trapped_air"].push_back({{"volume_m3", pocket.volume}, {"place_m", pocket.place}});
+    }
+  }
   if (flow_) json["flow_freezing_error_elements"] = flow_->freezing_error();
   json["share_below_4_elements_across"] = thin_.below_four;
   json["share_below_2_elements_across"] = thin_.below_two;
@@ -255,6 +261,15 @@ std::vector<std::string> FillingProcess::closing_lines() {
   if (front_->pockets_filled() > 0) {
     lines.push_back(fmt::format("{} pockets of air too small for the mesh were filled", front_->pockets_filled()));
   }
+  constexpr std::size_t most_lines = 5;
+  const std::vector<AirPocket> trapped = filling_->trapped_air();
+  for (std::size_t k = 0; k < std::min(most_lines, trapped.size()); ++k) {
+    const auto& place = trapped[k].place;
+    lines.push_back(fmt::format("air trap: {:.4g} m^3 around ({:.4g}, {:.4g}, {:.4g}) m", trapped[k].volume, place[0],
+                                place[1], place[2]));
+  }
+  if (trapped.size() > most_lines)
+    lines.push_back(fmt::format("and {} smaller air traps", trapped.size() - most_lines));
   if (flow_) {
     lines.push_back(fmt::format("keeping the flow between solves moved the front by {:.2g} elements in all",
                                 flow_->freezing_error()));
