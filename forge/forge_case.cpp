@@ -159,7 +159,9 @@ void ForgeCase::validate(CaseReader& reader) const {
   }
   refuse_shared_groups(reader, "body", bodies);
   refuse_shared_groups(reader, "boundary", common.boundaries);
-  if (!time.end && !time.increments && !time.stroke) {
+  const bool has_end =
+      reader.given("time", "end") || reader.given("time", "increments") || reader.given("time", "stroke");
+  if (!has_end) {
     reader.fail("time", "end", "nothing ends the run: give end, increments or stroke");
   }
   if (common.gravity) {

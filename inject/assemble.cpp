@@ -22,7 +22,10 @@ void InjectSimulator::describe(CaseReader& reader) {
 ///
 /// A scene of one fluid has no front and nothing to fill; a prescribed flow is not solved.
 std::unique_ptr<Process> InjectSimulator::assemble(const Communicator& comm, Mesh mesh, CaseReader& reader) {
-  (void)reader;
+  if (!case_.is_driven()) {
+    reader.fail("inlet", "", "nothing moves the fluids: add an [inlet.NAME], or prescribe the flow in [flow]");
+    reader.finish();
+  }
   auto process = std::make_unique<FillingProcess>(comm, std::move(mesh), case_);
   if (case_.flow.is_prescribed()) {
     process->add_prescribed_flow();
@@ -34,6 +37,7 @@ std::unique_ptr<Process> InjectSimulator::assemble(const Communicator& comm, Mes
     process->add_filling();
   }
   process->add_remeshing();
+  process->check_start();
   return process;
 }
 

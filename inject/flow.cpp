@@ -85,6 +85,12 @@ void Flow::start() {
   if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
 }
 
+void Flow::check_conditions() {
+  fronts_.set_initial();
+  refresh_mixture();
+  prepare(asked_drives(scene_, 0), 0);
+}
+
 Outcome Flow::solve_once() {
   return is_solved_ ? Outcome::done() : solve(0);
 }

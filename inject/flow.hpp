@@ -37,6 +37,9 @@ class Flow final : public Component {
   nlohmann::json save() const;
   void load(const nlohmann::json& saved);
 
+  /// Throws InputError where the conditions at t = 0 cannot be met: before anything is written. Collective.
+  void check_conditions();
+
  private:
   std::vector<GateDrive> present_drives(Real time);
   bool is_due(const std::vector<GateDrive>& drives);

@@ -84,6 +84,11 @@ void FillingProcess::add_prescribed_flow() {
   order_.push_back(prescribed_.get());
 }
 
+void FillingProcess::check_start() {
+  if (flow_) flow_->check_conditions();
+  if (prescribed_) prescribed_->evaluate(0);
+}
+
 void FillingProcess::add_front() {
   way_ = way_of_fronts(scene_, fronts_);
   std::function<void(Real)> renew;

@@ -23,6 +23,8 @@ class FillingProcess final : public Process {
   void add_remeshing();
   void add_flow();
   void add_prescribed_flow();
+  /// Throws InputError where the scene cannot start. Call it after all parts were added. Collective.
+  void check_start();
   void add_front();
   void add_filling();
   bool has_fronts() const { return fronts_.size() > 0; }

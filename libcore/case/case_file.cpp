@@ -112,7 +112,8 @@ void Mistakes::throw_if_any(const std::filesystem::path& case_path) const {
   if (sorted.size() > 1) text = fmt::format("{} mistakes in {}\n  ", sorted.size(), case_path.string());
   for (const Mistake& mistake : sorted) {
     if (&mistake != sorted.data()) text += "\n  ";
-    text += fmt::format("{}: {}", mistake.place.text(), mistake.message);
+    const std::string place = mistake.place.file.empty() ? case_path.string() : mistake.place.text();
+    text += fmt::format("{}: {}", place, mistake.message);
   }
   throw InputError(text);
 }

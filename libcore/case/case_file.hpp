@@ -11,7 +11,7 @@
 
 namespace malleus {
 
-/// Where something was written. Line 0: on the command line.
+/// Where something was written. Line 0: on the command line, or nowhere in particular; no file: the case as a whole.
 struct Place {
   std::string file;  ///< as the user named it
   int line = 0;

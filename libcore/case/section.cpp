@@ -126,7 +126,7 @@ const CaseEntry* Section::entry(std::string_view key) const {
 }
 
 Place Section::place() const {
-  return source_ != nullptr ? source_->place : Place{"the case", 0};
+  return source_ != nullptr ? source_->place : Place{};
 }
 
 bool Section::given(std::string_view key) const {
@@ -188,7 +188,7 @@ void Section::read_value(Key& key, const CaseEntry& entry) {
     key.assign(raw);
   } catch (const InputError& error) {
     fail(key.name, error.what());
-    if (!key.choices.empty()) has_wrong_choice_ = true;
+    has_wrong_value_ = true;
   }
 }
 

@@ -95,8 +95,8 @@ class Section {
   /// @name For CaseReader
   /// @{
   void read_values();
-  /// Whether the struct's own validation makes sense: no choice was misspelt.
-  bool may_validate() const { return !has_wrong_choice_; }
+  /// Whether the struct's own validation makes sense: all values that are given could be read.
+  bool may_validate() const { return !has_wrong_value_; }
   const std::deque<Key>& keys() const { return keys_; }
   const CaseEntry* entry(std::string_view key) const;
   /// Whether validation found that the key has no meaning here, so that its default is not in force.
@@ -119,7 +119,7 @@ class Section {
   std::deque<Key> keys_;  ///< a deque: keys stay where they are while more are added
   Mistakes mistakes_;
   std::vector<std::string> out_of_force_;
-  bool has_wrong_choice_ = false;
+  bool has_wrong_value_ = false;
 };
 
 template <class T, class Member>

@@ -71,8 +71,10 @@ flow_rate = 1 cm3/s
 group = right
 [wall.bottom]
 group = bottom
+condition = slip
 [wall.top]
 group = top
+condition = slip
 """,
 }
 BODY = {"forge": "body.part", "inject": "fluid.melt"}
