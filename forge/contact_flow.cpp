@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/log.hpp"
+#include "mesh/simplex.hpp"
 #include "solvers/linear_database.hpp"
 
 namespace malleus::forge {
@@ -136,6 +137,17 @@ Outcome ContactFlow::check_blows(Real dt) const {
   return Outcome::done();
 }
 
+bool ContactFlow::has_turned_elements() const {
+  bool turned = false;
+  with_dim(scene_.mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < scene_.mesh.elements() && !turned; ++e) {
+      turned = !(simplex_volume<D>(simplex_points<D>(scene_.mesh, e)) > 0);
+    }
+  });
+  return scene_.comm->any(turned);
+}
+
 Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first) {
   std::vector<std::vector<Real>> at_start;
   for (const Field* field : std::as_const(scene_.fields).all()) {
@@ -146,6 +158,7 @@ Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first
   for (std::size_t i = 0; i < scene_.mesh.coordinates.size(); ++i) {
     scene_.mesh.coordinates[i] = first.start[i] + 0.5 * increment.dt * scene_.step_velocity[i];
   }
+  if (has_turned_elements()) return Outcome::retry("an element would turn over within the step");
   Stage stage = first;
   stage.time = increment.start() + 0.5 * increment.dt;
   for (Tool& tool : scene_.tools) tool.plan(stage.start_time, stage.displacement, stage.time);
@@ -157,9 +170,9 @@ Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first
   scene_.step_strain_rate.assign(strain_rate.begin(), strain_rate.end());
   std::size_t i = 0;
   for (Field* field : scene_.fields.all()) field->assign(at_start[i++]);
-  const int iterations = report_.newton_iterations;
+  const int iterations = report_.newton_iterations - report.newton_iterations;
   report_ = report;
-  report_.newton_iterations = iterations;
+  report_.midpoint_iterations = iterations;
   memory_ = memory;
   return Outcome::done();
 }

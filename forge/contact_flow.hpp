@@ -11,7 +11,8 @@ namespace malleus::forge {
 
 /// What an increment's solves took and left, for history.csv.
 struct FlowReport {
-  int newton_iterations = 0;
+  int newton_iterations = 0;            ///< of the solve that gives forces and fields
+  int midpoint_iterations = 0;          ///< of the one at the middle, where Runge-Kutta makes the step
   std::vector<Vector> tool_forces;      ///< [tool] N, on it
   std::vector<Vector> body_forces;      ///< [region] N, on it as a master
   std::vector<Vector> boundary_forces;  ///< [boundary] N, on what imposes it
@@ -88,6 +89,7 @@ class ContactFlow final : public Component {
   void save();
   Outcome run_stages(const Increment& increment);
   Outcome check_blows(Real dt) const;
+  bool has_turned_elements() const;
   Outcome run_midpoint(const Increment& increment, const Stage& first);
   Outcome solve_under_presses(const Stage& stage);
   Outcome solve(const Stage& stage);

@@ -1,5 +1,7 @@
 #include "forge/forge_case.hpp"
 
+#include <algorithm>
+
 namespace malleus::forge {
 
 void BodySettings::describe(Section& s) {
@@ -147,6 +149,15 @@ void ForgeCase::describe(CaseReader& reader) {
   common.describe_run(reader);
 }
 
+bool ForgeCase::anything_moves() const {
+  return std::any_of(tools.begin(), tools.end(), [](const ToolSettings& tool) { return tool.may_advance(); }) ||
+         std::any_of(common.boundaries.begin(), common.boundaries.end(), [](const BoundarySettings& boundary) {
+           if (!boundary.velocity) return boundary.has_velocity();
+           return std::any_of(boundary.velocity->begin(), boundary.velocity->end(),
+                              [](const std::optional<Real>& component) { return component && *component != 0; });
+         });
+}
+
 void ForgeCase::validate(CaseReader& reader) const {
   const auto refuse = [&](bool is_there, const char* section, const char* message) {
     if (is_there) reader.fail(section, "", message);
@@ -163,6 +174,10 @@ void ForgeCase::validate(CaseReader& reader) const {
       reader.given("time", "end") || reader.given("time", "increments") || reader.given("time", "stroke");
   if (!has_end) {
     reader.fail("time", "end", "nothing ends the run: give end, increments or stroke");
+  }
+  if (time.stroke && !time.end && !time.increments && !anything_moves()) {
+    reader.fail("time", "stroke",
+                "no tool and no boundary moves, so that nothing ends the run: give end or increments");
   }
   if (common.gravity) {
     for (const BodySettings& body : bodies) {

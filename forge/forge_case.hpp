@@ -77,12 +77,15 @@ struct ToolSettings {
 
   void describe(Section& s);
   void validate(Section& s) const;
+  bool may_advance() const;    ///< whether a velocity, a table or a press moves it along a direction
   Real surface_scale() const;  ///< m per length_unit; InputError where that is no length
 
  private:
   void describe_shape(Section& s);
   void describe_motion(Section& s);
   void validate_shape(Section& s) const;
+  void refuse_other_shapes(Section& s) const;
+  void refuse_other_presses(Section& s) const;
   void validate_motion(Section& s) const;
 };
 
@@ -141,6 +144,8 @@ struct ForgeCase {
   void describe(CaseReader& reader);
   /// Rules between sections. Local.
   void validate(CaseReader& reader) const;
+  /// Whether some tool or boundary has a stroke.
+  bool anything_moves() const;
 };
 
 }  // namespace malleus::forge

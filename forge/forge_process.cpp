@@ -11,6 +11,8 @@
 namespace malleus::forge {
 namespace {
 
+/// A run that a stroke ends is over after so many increments in which the stroke did not advance.
+constexpr int most_at_rest = 200;
 constexpr Real no_limit = std::numeric_limits<Real>::infinity();
 
 nlohmann::json press_json(const PressState& state) {
@@ -200,8 +202,27 @@ Real ForgeProcess::leading_speed() const {
   return 0;
 }
 
+/// Where the stroke alone ends the run: why it will not be reached.
+std::optional<std::string> ForgeProcess::stalled() const {
+  if (!case_.time.stroke || case_.time.end || case_.time.increments) return std::nullopt;
+  const Real stroke = leading_stroke().value_or(0);
+  for (const Tool& tool : scene_->tools) {
+    if (!(tool.motion().direction.squaredNorm() > 0)) continue;
+    if (tool.press().is_stalled(scene_->progress.time)) {
+      return fmt::format("the press of {} stalled at its force limit, after {:.6g} m of the stroke", tool.name(),
+                         stroke);
+    }
+    break;
+  }
+  if (at_rest_ >= most_at_rest) {
+    return fmt::format("nothing advanced in {} increments, after {:.6g} m of the stroke", at_rest_, stroke);
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> ForgeProcess::finished() {
   if (case_.time.stroke && leading_stroke().value_or(0) >= *case_.time.stroke * (1 - 1e-9)) return "stroke reached";
+  if (const auto why = stalled()) return why;
   bool all_stopped = !scene_->tools.empty() && !(scene_->boundaries->largest_speed(scene_->progress.time) > 0);
   for (const Tool& tool : scene_->tools) {
     if (tool.moves()) all_stopped = all_stopped && tool.press().state().stopped;
@@ -278,6 +299,9 @@ std::vector<std::string> ForgeProcess::history_columns() const {
 
 std::vector<HistoryCell> ForgeProcess::history_row() {
   const FlowReport& report = flow_.report();
+  const Real stroke = leading_stroke().value_or(0);
+  at_rest_ = stroke != last_stroke_ ? 0 : at_rest_ + 1;
+  last_stroke_ = stroke;
   max_penetration_ = std::max(max_penetration_, report.max_penetration);
   max_imbalance_ = std::max(max_imbalance_, report.force_imbalance);
   newton_total_ += report.newton_iterations;
@@ -311,7 +335,9 @@ Real ForgeProcess::volume_change() const {
 
 std::string ForgeProcess::increment_note() const {
   const FlowReport& report = flow_.report();
-  std::string note = fmt::format("newton {}, volume {:+.1e}", report.newton_iterations, volume_change());
+  std::string note = fmt::format("newton {}", report.newton_iterations);
+  if (report.midpoint_iterations > 0) note += fmt::format("+{}", report.midpoint_iterations);
+  note += fmt::format(", volume {:+.1e}", volume_change());
   for (const Opponent& one : opponents()) note += fmt::format(", F {} {:.4g} N", one.name, force_on(one).norm());
   return note;
 }

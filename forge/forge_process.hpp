@@ -53,6 +53,7 @@ class ForgeProcess final : public Process {
   Vector force_on(const Opponent& opponent) const;
   Real stroke_of(const Opponent& opponent) const;
   std::optional<Real> leading_stroke() const;
+  std::optional<std::string> stalled() const;
   Real leading_speed() const;
   Real planned_strain() const;
   Real volume_step() const;
@@ -69,6 +70,8 @@ class ForgeProcess final : public Process {
   std::optional<TracerMotion> tracers_;
   Motion motion_;
   int last_newton_ = 0;
+  Real last_stroke_ = 0;      ///< m, of the leading tool or boundary
+  int at_rest_ = 0;           ///< increments since it last advanced
   Real max_penetration_ = 0;  ///< of the run, m
   Real max_imbalance_ = 0;
   GlobalId newton_total_ = 0;

@@ -83,6 +83,35 @@ std::vector<Clearance> measure_clearances(Scene& scene) {
   return list;
 }
 
+std::vector<Swallowed> find_swallowed(Scene& scene, const std::vector<char>& may_be_open) {
+  const Mesh& mesh = scene.mesh;
+  std::vector<Swallowed> found;
+  for (std::size_t t = 0; t < scene.tools.size(); ++t) {
+    Tool& tool = scene.tools[t];
+    tool.plan(scene.progress.time, euler_step(0));
+    std::vector<Real> nearest(scene.bodies.size(), -none);
+    std::vector<Real> deepest(scene.bodies.size(), none);
+    for (LocalId e = 0; e < mesh.elements(); ++e) {
+      const auto body = static_cast<std::size_t>(mesh.element_region[static_cast<std::size_t>(e)]);
+      if (nearest[body] > 0) continue;
+      for (const LocalId node : mesh.nodes_of_element(e)) {
+        const Real distance = tool.distance_at_end(to_vector(mesh.point(node), mesh.dim));
+        nearest[body] = std::max(nearest[body], distance);
+        deepest[body] = std::min(deepest[body], distance);
+      }
+    }
+    for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
+      const Real least = scene.comm->max(nearest[body]);
+      const Real depth = -scene.comm->min(deepest[body]);
+      const Real edge = scene.body_scales[body].edge;
+      if (!scene.bodies[body].is_deformable() || least > harmless_overlap * edge || depth < 0.5 * edge) continue;
+      if (may_be_open[t] != 0 && least < -edge) continue;
+      found.push_back({t, scene.bodies[body].name, depth});
+    }
+  }
+  return found;
+}
+
 void report_clearances(Scene& scene) {
   for (const Clearance& clearance : measure_clearances(scene)) {
     const Real share = -clearance.gap / clearance.edge;

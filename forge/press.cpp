@@ -164,6 +164,12 @@ void Press::commit(Real force, Real time, const Displacement& displacement) {
   state_.last_force = force;
 }
 
+bool Press::is_stalled(Real time) const {
+  if (spec_.kind != PressKind::hydraulic) return false;
+  const Real full = spec_.speed(time);
+  return full > 0 && state_.allowed_speed < crawling * full;
+}
+
 Real Press::step_limit(Real force) const {
   if (!has_inertia() || state_.stopped || !(force > 0)) return std::numeric_limits<Real>::max();
   const Real rest = 0.5 * spec_.mass * state_.speed * state_.speed;

@@ -64,6 +64,8 @@ class Press {
   bool accepts(Real force, Real time, Real tolerance);
   /// Ends an increment. force: what resists the motion, N. Hammer and screw: m dw/dt = -force, by the nodes' scheme.
   void commit(Real force, Real time, const Displacement& displacement);
+  /// Hydraulic: at its force limit it crawls, or stands still, at a time [s].
+  bool is_stalled(Real time) const;
   /// The largest step in which a blow's work against the force [N] is a small part of its energy [s].
   Real step_limit(Real force) const;
 

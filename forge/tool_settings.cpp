@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "forge/forge_case.hpp"
 
 #include "base/error.hpp"
@@ -74,7 +76,39 @@ void ToolSettings::validate(Section& s) const {
   validate_motion(s);
 }
 
+/// Keys that say nothing of the shape that is chosen.
+void ToolSettings::refuse_other_shapes(Section& s) const {
+  const auto refuse_unless = [&](std::initializer_list<ShapeKind> shapes, std::initializer_list<const char*> keys,
+                                 const char* why) {
+    if (std::find(shapes.begin(), shapes.end(), shape) != shapes.end()) return;
+    for (const char* key : keys) s.refuse(key, why);
+  };
+  refuse_unless({ShapeKind::plane}, {"normal"}, "only shape = plane has one");
+  refuse_unless({ShapeKind::sphere, ShapeKind::cylinder}, {"radius"}, "only shape = sphere and cylinder have one");
+  refuse_unless({ShapeKind::cylinder}, {"length"}, "only shape = cylinder has one");
+  refuse_unless({ShapeKind::box}, {"size"}, "only shape = box has one");
+  refuse_unless({ShapeKind::surface}, {"file", "length_unit"}, "only shape = surface has one");
+  if (shape != ShapeKind::cylinder && spin == 0) s.refuse("axis", "only shape = cylinder, or a spin, has one");
+  if (spin == 0) {
+    for (const char* key : {"spin_axis", "pivot"}) s.refuse(key, "the tool has no spin");
+  }
+}
+
+/// Keys of presses other than the one that is chosen.
+void ToolSettings::refuse_other_presses(Section& s) const {
+  const auto refuse_unless = [&](std::initializer_list<PressKind> presses, std::initializer_list<const char*> keys,
+                                 const char* why) {
+    if (std::find(presses.begin(), presses.end(), press) != presses.end()) return;
+    for (const char* key : keys) s.refuse(key, why);
+  };
+  refuse_unless({PressKind::hydraulic}, {"force_limit"}, "only press = hydraulic has one");
+  refuse_unless({PressKind::crank}, {"crank_radius", "rod_length", "rotation_speed", "start_height"},
+                "only press = crank has one");
+  refuse_unless({PressKind::hammer, PressKind::screw}, {"energy", "mass"}, "only press = hammer and screw have one");
+}
+
 void ToolSettings::validate_shape(Section& s) const {
+  refuse_other_shapes(s);
   switch (shape) {
     case ShapeKind::plane:
       s.require("normal", "shape = plane");
@@ -103,9 +137,19 @@ void ToolSettings::validate_shape(Section& s) const {
   if (size && to_vector(size->data(), 3).norm() == 0) s.fail("size", "has no positive edge");
 }
 
+bool ToolSettings::may_advance() const {
+  if (!stroke_file.empty() || press != PressKind::speed) return true;
+  if (velocity) return to_vector(velocity->data(), 3).norm() > 0;
+  return velocity_components[0] || velocity_components[1] || velocity_components[2];
+}
+
 void ToolSettings::validate_motion(Section& s) const {
   const bool has_velocity = velocity || velocity_components[0] || velocity_components[1] || velocity_components[2];
   const bool has_table = !stroke_file.empty();
+  for (const char* component : {"velocity_x", "velocity_y", "velocity_z"}) {
+    if (velocity && s.given(component)) s.fail(component, "is already given as velocity");
+  }
+  refuse_other_presses(s);
   if (has_table && has_velocity) s.fail("stroke_file", "and velocity are given: one of them moves the tool");
   if (has_table && press != PressKind::speed) s.fail("stroke_file", "moves the tool by itself: press must be speed");
   const bool has_direction = direction || (velocity && to_vector(velocity->data(), 3).norm() > 0) || normal;

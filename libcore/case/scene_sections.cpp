@@ -1,5 +1,7 @@
 #include "case/scene_sections.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace malleus {
@@ -85,11 +87,28 @@ void BoundarySettings::validate(Section& s) const {
   const bool imposes = has_velocity() || has_traction() || pressure.has_value();
   if (type == Type::symmetry && imposes) s.fail("type", "symmetry allows no velocity, traction or pressure");
   if (type == Type::imposed && !imposes) s.fail("needs velocity, traction, pressure or type = symmetry");
+  refuse_two_causes(s);
   for (const std::string_view axis : axes) {
     for (const std::string_view quantity : {"velocity", "traction"}) {
       const std::string component = std::string(quantity) + "_" + std::string(axis);
       if (s.given(quantity) && s.given(component)) s.fail(component, "is already given as " + std::string(quantity));
     }
+  }
+}
+
+/// Where the velocity is imposed a force does nothing. A component that is free may carry a traction.
+void BoundarySettings::refuse_two_causes(Section& s) const {
+  if (!has_velocity()) return;
+  const ExpressionVector imposed = imposed_velocity();
+  const bool all = std::all_of(imposed.begin(), imposed.end(), [](const auto& one) { return one.has_value(); });
+  if (pressure && all) s.fail("pressure", "the velocity is imposed, so that a pressure does nothing");
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (!imposed[i]) continue;
+    const bool loaded = traction ? (*traction)[i] != 0 : traction_components[i].has_value();
+    if (!loaded) continue;
+    s.fail(traction ? "traction" : "traction_" + std::string(axes[i]),
+           fmt::format("the velocity along {} is imposed, so that a traction along it does nothing", axes[i]));
+    return;
   }
 }
 

@@ -110,6 +110,9 @@ struct BoundarySettings {
   /// Of either form; 0 where nothing is given. The pressure comes on top, along the normal.
   std::array<Expression, 3> imposed_traction() const;
   bool has_traction() const;
+
+ private:
+  void refuse_two_causes(Section& s) const;
 };
 
 }  // namespace malleus

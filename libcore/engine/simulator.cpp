@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "base/error.hpp"
 #include "base/log.hpp"
@@ -116,10 +118,28 @@ void check_partition(const CommonSections& common, CaseReader& reader) {
   }
 }
 
+/// Rounding aside, no node of a scene that is revolved lies beyond its axis. Collective.
+void refuse_negative_radii(const Communicator& comm, const Mesh& mesh, CaseReader& reader) {
+  Real low = std::numeric_limits<Real>::max();
+  Real high = -low;
+  for (LocalId node = 0; node < mesh.nodes(); ++node) {
+    low = std::min(low, mesh.point(node)[0]);
+    high = std::max(high, mesh.point(node)[0]);
+  }
+  low = comm.min(low);
+  high = comm.max(high);
+  if (low >= -1e-9 * std::max(std::abs(low), std::abs(high))) return;
+  reader.fail("case", "geometry",
+              fmt::format("the mesh has r < 0: smallest x = {:.4g} m (x is r, the axis of revolution is x = 0)", low));
+}
+
 int run_scene(const Communicator& comm, Simulator& simulator, Mesh mesh, RunSettings settings, CaseReader& reader) {
+  const CommonSections& common = simulator.common();
+  if (common.case_settings.geometry == CaseGeometry::axisymmetric && mesh.dim == 2) {
+    refuse_negative_radii(comm, mesh, reader);
+  }
   const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
   const std::unique_ptr<Process> process = simulator.assemble(comm, std::move(mesh), reader);
-  const CommonSections& common = simulator.common();
   check_output_fields(*process, common, reader);
   check_probe_fields(*process, common, reader);
   reader.check_mesh(names);

@@ -87,6 +87,13 @@ class Upsetting(Forging):
                     self.assertAlmostEqual(row[f"force_low_{'xyz'[axis]}_N"] / force, -1, delta=10 * self.TOLERANCE)
                     self.assertLessEqual(row["newton_iterations"], 1 if m == 1 else 15)
 
+    def test_a_row_counts_the_iterations_of_its_own_solve(self):
+        # The first increment solves twice, at its start and at its middle.
+        box_mesh(self.directory / "box.msh", 2)
+        rows = self.forge(case_text(1, 2, 1, "boundaries", time="increments = 2\nstep = 1e-3"))
+        self.assertEqual([row["newton_iterations"] for row in rows], [1, 1])
+        self.assertIn("newton 1+1,", (self.directory / "out" / "run.log").read_text())
+
     def test_a_tool_presses_by_the_penalty_law(self):
         # r = c eta / edge: p = r (V - what is left of it on each side), so F is that of the speed V - 2 p / r.
         dim, axis, c = 2, 1, 1e2
@@ -191,6 +198,30 @@ class Blow(Forging):
         self.assertAlmostEqual(strokes[-1] / (1 - height), 1, delta=5e-3)
 
 
+class Stroke(Forging):
+    """Runs that nothing but their stroke ends."""
+
+    def test_it_ends_where_a_press_stalls(self):
+        # Below the cut-off rate (0.01 of the scene's) the material is linear: at 0.02 of the force for full speed the
+        # press has less than a thousandth of it.
+        box_mesh(self.directory / "box.msh", 2, cells=(2, 2))
+        limit = 0.02 * flow_stress(2, 1, 0.3)
+        text = case_text(0.3, 2, 1, "tools", time="stroke = 0.9")
+        text = text.replace("velocity = 0 -1.0", f"velocity = 0 -1.0\npress = hydraulic\nforce_limit = {limit!r}")
+        rows = self.forge(text, "-D", "output.every=1000")
+        self.assertEqual(summary(self.directory / "out")["status"], "done")
+        self.assertIn("the press of upper stalled at its force limit", summary(self.directory / "out")["reason"])
+        self.assertLess(rows[-1]["stroke_upper_m"], 0.1)
+
+    def test_it_needs_something_that_moves(self):
+        box_mesh(self.directory / "box.msh", 2)
+        text = case_text(0.3, 2, 1, "boundaries", time="stroke = 0.1").replace("free -1.0", "free 0.0")
+        (self.directory / "case.ini").write_text(text)
+        result = run("forge", self.directory / "case.ini", self.directory / "out", "--check", check=False)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("case.ini:4: [time] stroke = 0.1: no tool and no boundary moves", result.stderr)
+
+
 class Stress(Forging):
     """2 eta eps - p I of the state that velocity, pressure and viscosity belong to, in outputs and at probes."""
     DIAGONAL, OTHERS = [0, 3, 5], [1, 2, 4]  # of xx xy xz yy yz zz
@@ -291,6 +322,32 @@ class WrongScenes(Forging):
                          "[body_force] y", ranks=(1, 2, 4))
 
 
+    def test_keys_that_another_one_overrules_are_refused(self):
+        box_mesh(self.directory / "box.msh", 2)
+        text = case_text(0.3, 2, 1, "tools")
+        for keys, part in (("velocity_x = 1", "velocity_x = 1: is already given as velocity"),
+                           ("force_limit = 10 N", "force_limit = 10 N: not allowed here (only press = hydraulic"),
+                           ("energy = 1 J", "energy = 1 J: not allowed here (only press = hammer"),
+                           ("crank_radius = 1", "crank_radius = 1: not allowed here (only press = crank"),
+                           ("radius = 1", "radius = 1: not allowed here (only shape = sphere"),
+                           ("size = 1 1", "size = 1 1: not allowed here (only shape = box"),
+                           ("pivot = 1 1", "pivot = 1 1: not allowed here (the tool has no spin)")):
+            with self.subTest(keys):
+                self.refused(text.replace("[tool.upper]\n", f"[tool.upper]\n{keys}\n"), part, ranks=(1,))
+        both = case_text(0.3, 2, 1, "boundaries")
+        held = "velocity = free 0.0"
+        self.refused(both.replace(held, held + "\ntraction = 0 5"), "traction = 0 5: the velocity along y is imposed",
+                     ranks=(1,))
+        self.forge(both.replace(held, held + "\ntraction = 5 0"))
+
+    def test_a_mesh_beyond_the_axis_is_refused(self):
+        mesh = BoxMesh(2)
+        mesh.add("billet", [-0.25, 0.0], [1.0, 1.0], (3, 3))
+        mesh.write(self.directory / "box.msh")
+        text = "[case]\ngeometry = axisymmetric\n" + case_text(0.3, 2, 1, "boundaries")
+        self.refused(text, "case.ini:2: [case] geometry = axisymmetric", "the mesh has r < 0: smallest x = -0.25 m")
+
+
 class Robustness(Forging):
     def stick(self, m, *options, check=True):
         box_mesh(self.directory / "box.msh", 2, cells=(6, 6))
@@ -360,8 +417,29 @@ class Start(Forging):
         text = case_text(0.3, 2, 1, "tools", time="increments = 1\nstep = 1e-3")
         text += "[tool.turned]\nshape = plane\npoint = 0 1\nnormal = 0 1\n"
         (self.directory / "case.ini").write_text(text)
-        run("forge", self.directory / "case.ini", self.directory / "out", check=False)
-        self.assertIn("wrong side?", (self.directory / "out" / "run.log").read_text())
+        for options, ranks in ((("--check",), 1), ((), 2)):
+            result = run("forge", self.directory / "case.ini", self.directory / "out", *options, ranks=ranks, check=False)
+            self.assertEqual(result.returncode, 2)
+            for part in ("[tool.turned] normal = 0 1", "body 'billet' lies wholly inside the tool at the start, 1 m deep"):
+                self.assertIn(part, result.stderr)
+
+    def test_a_sheet_turned_inside_out_is_told(self):
+        box_mesh(self.directory / "box.msh", 3, cells=(2, 2, 2))
+        corners = [(-1, -1, 1), (2, -1, 1), (2, 2, 1), (-1, 2, 1)]
+        for order, code in (((0, 1, 2, 3), 2), ((0, 3, 2, 1), 0)):
+            p = [corners[i] for i in order]
+            facets = "".join("facet normal 0 0 0\nouter loop\n"
+                             + "".join("vertex {} {} {}\n".format(*x) for x in triangle) + "endloop\nendfacet\n"
+                             for triangle in ((p[0], p[1], p[2]), (p[0], p[2], p[3])))
+            (self.directory / "top.stl").write_text(f"solid t\n{facets}endsolid t\n")
+            text = case_text(0.3, 3, 2, "tools").replace(
+                "[tool.upper]\nshape = plane\npoint = 0 0 1.0\nnormal = 0 0 -1.0\n",
+                "[tool.upper]\nshape = surface\nfile = top.stl\n")
+            self.assertIn("top.stl", text)
+            (self.directory / "case.ini").write_text(text)
+            result = run("forge", self.directory / "case.ini", self.directory / "out", check=False)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertEqual("turn its facets" in result.stderr, code == 2)
 
 
 class Gravity(Forging):
