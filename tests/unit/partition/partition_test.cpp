@@ -53,7 +53,8 @@ TEST_P(Partitions, AreBalancedInOnePieceAndBeatTheCurve) {
 }
 
 TEST_P(Partitions, FollowTheSpeedsOfTheProcessors) {
-  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
+  // On smaller meshes what is exchanged weighs so much that balance gives way to it.
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 24 : 10);
   Architecture machine = equal_architecture(4);
   machine.speed = {1, 2, 3, 4};
   const PartitionPlan plan = make_partition(world(), mesh, {}, machine, {});
