@@ -73,20 +73,18 @@ void Flow::refuse_blocked_vents() const {
                                       [](const InletSettings& inlet) { return !inlet.pressure; });
   if (!is_imposed || scene_.settings.vents.empty() || fronts_.has_way_out()) return;
   throw InputError(fmt::format(
-      "[vent.{}]: the flow from the inlets reaches no open part of a vent: they are covered at the start, or "
+      "[vent.{}] group: the flow from the inlets reaches no open part of a vent: they are covered at the start, or "
       "behind sections one element thin, where nothing flows; refine the mesh there or place other vents",
       scene_.settings.vents.front().name));
 }
 
 void Flow::start() {
-  fronts_.set_initial();
-  refuse_blocked_vents();
   const Outcome outcome = solve(0);
   if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
 }
 
 void Flow::check_conditions() {
-  fronts_.set_initial();
+  refuse_blocked_vents();
   refresh_mixture();
   prepare(asked_drives(scene_, 0), 0);
 }

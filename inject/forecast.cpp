@@ -65,9 +65,8 @@ Real increments_of_the_front(const Scene& scene, Real way, Real stride) {
 
 /// Along the edges of the mesh: sweeps up and down the nodes' numbers, which follow a space-filling curve, until no
 /// rank's distances become shorter.
-Real way_of_fronts(const Scene& scene, FrontSet& fronts) {
+Real way_of_fronts(const Scene& scene, const FrontSet& fronts) {
   if (fronts.size() == 0) return 0;
-  fronts.set_initial();
   const auto n = static_cast<std::size_t>(scene.mesh.nodes());
   std::vector<Real> way(n);
   for (std::size_t node = 0; node < n; ++node) {

@@ -7,9 +7,8 @@
 
 namespace malleus::inject {
 
-/// The way [m] that the fronts of a scene have before them: from where they start to the farthest node. Sets the
-/// fronts to their start. Collective.
-Real way_of_fronts(const Scene& scene, FrontSet& fronts);
+/// The way [m] that the fronts of a scene have before them: from where they stand to the farthest node. Collective.
+Real way_of_fronts(const Scene& scene, const FrontSet& fronts);
 
 /// Increments: the front crosses the elements of its way, and an increment a stride of them; more where it starts
 /// faster than it goes on, less where [time] end comes before the cavity is full. Times and memory from measured

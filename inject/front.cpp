@@ -86,7 +86,7 @@ void Front::prepare_remesh() {
 void Front::finish_remesh() {
   for (std::size_t i = 0; i < fronts_.size(); ++i)
     restore_volume(scene_.comm, scene_.mesh, scene_.measures, fronts_.values(i), targets_[i]);
-  const std::vector<Real> filled = union_of_fronts();
+  const std::vector<Real> filled = fronts_.united();
   const std::span<Real> fill_time = scene_.fields["fill_time"].values();
   for (std::size_t n = 0; n < filled.size(); ++n) fill_time[n] = filled[n] > 0 ? fill_time[n] : not_filled;
 }
@@ -95,8 +95,7 @@ void Front::finish_remesh() {
 std::vector<char> Front::open_nodes() const {
   std::vector<char> open(static_cast<std::size_t>(scene_.mesh.nodes()), 0);
   for (const BoundaryPart& part : scene_.parts) {
-    using Kind = BoundaryPart::Kind;
-    if (part.kind != Kind::inlet && part.kind != Kind::vent && part.kind != Kind::imposed) continue;
+    if (part.kind != BoundaryPart::Kind::inlet && !scene_.is_opening(part)) continue;
     for (LocalId node = 0; node < scene_.mesh.nodes(); ++node) {
       if (part.normals->holds(node)) open[static_cast<std::size_t>(node)] = 1;
     }
@@ -116,25 +115,15 @@ std::vector<char> Front::wetted_nodes() const {
 }
 
 void Front::start() {
-  fronts_.set_initial();
   fronts_.part();
   targets_.clear();
   for (std::size_t i = 0; i < fronts_.size(); ++i) {
     targets_.push_back(positive_volume(scene_.comm, scene_.mesh, scene_.measures, fronts_.values(i)));
   }
-  const std::vector<Real> filled = union_of_fronts();
+  const std::vector<Real> filled = fronts_.united();
   const std::span<Real> fill_time = scene_.fields["fill_time"].values();
   for (std::size_t n = 0; n < filled.size(); ++n) fill_time[n] = filled[n] > 0 ? 0 : not_filled;
   state_.initial = state_.filled = std::accumulate(targets_.begin(), targets_.end(), 0.0);
-}
-
-std::vector<Real> Front::union_of_fronts() const {
-  std::vector<Real> largest(static_cast<std::size_t>(scene_.mesh.nodes()), -1e300);
-  for (std::size_t i = 0; i < fronts_.size(); ++i) {
-    const std::span<const Real> values = std::as_const(fronts_).values(i);
-    for (std::size_t n = 0; n < largest.size(); ++n) largest[n] = std::max(largest[n], values[n]);
-  }
-  return largest;
 }
 
 Real Front::rate() {
@@ -187,7 +176,7 @@ Outcome Front::advance(const Increment& increment) {
 }
 
 Outcome Front::substep(Real start, Real dt) {
-  const std::vector<Real> before = union_of_fronts();
+  const std::vector<Real> before = fronts_.united();
   const std::span<const Real> velocity = scene_.fields["velocity"].values();
   for (std::size_t i = 0; i < fronts_.size(); ++i) {
     const std::span<Real> level_set = fronts_.values(i);
@@ -321,7 +310,7 @@ ImposedLevelSet Front::imposed(std::size_t front, Real dt) const {
 }
 
 void Front::mark_fill_time(const std::vector<Real>& before, Real start, Real dt) {
-  const std::vector<Real> after = union_of_fronts();
+  const std::vector<Real> after = fronts_.united();
   const std::span<Real> fill_time = scene_.fields["fill_time"].values();
   for (std::size_t n = 0; n < after.size(); ++n) {
     if (fill_time[n] != not_filled || !(after[n] > 0)) continue;

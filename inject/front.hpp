@@ -19,7 +19,8 @@ namespace malleus::inject {
 /// [front] cfl of an element at a time. Fields: the level sets; fill_time [s]: when the front passed, -1 ahead of it.
 class Front final : public Component {
  public:
-  /// renew_velocity(time): brings the velocity field to that time; empty for a flow that is kept over an increment.
+  /// fronts: where they start, see FrontSet::set_initial(). renew_velocity(time): brings the velocity field to that
+  /// time; empty for a flow that is kept over an increment.
   Front(Scene& scene, FrontSet& fronts, FillingState& state, std::function<void(Real)> renew_velocity);
 
   std::string name() const override { return "front"; }
@@ -63,7 +64,6 @@ class Front final : public Component {
   Real substep_rate();
   Outcome substep(Real start, Real dt);
   void mark_fill_time(const std::vector<Real>& before, Real start, Real dt);
-  std::vector<Real> union_of_fronts() const;
   void snapshot();
 
   Scene& scene_;

@@ -1,6 +1,7 @@
 #include "inject/front_set.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "mesh/node_regions.hpp"
@@ -147,9 +148,7 @@ std::vector<char> FrontSet::ways_out() const {
   const std::vector<char> reached = reached_by_flow(held);
   std::vector<char> open(held.size(), 0);
   for (const BoundaryPart& part : scene_.parts) {
-    const bool is_imposed = part.kind == BoundaryPart::Kind::imposed &&
-                            scene_.settings.common.boundaries[part.index].type != BoundarySettings::Type::symmetry;
-    if (part.kind != BoundaryPart::Kind::vent && !is_imposed) continue;
+    if (!scene_.is_opening(part)) continue;
     for (std::size_t n = 0; n < held.size(); ++n) {
       if (part.normals->holds(static_cast<LocalId>(n)) && held[n] == 0 && reached[n] != 0) open[n] = 1;
     }
@@ -160,6 +159,15 @@ std::vector<char> FrontSet::ways_out() const {
 bool FrontSet::has_way_out() const {
   const std::vector<char> open = ways_out();
   return scene_.comm.any(std::any_of(open.begin(), open.end(), [](char is_open) { return is_open != 0; }));
+}
+
+std::vector<Real> FrontSet::united() const {
+  std::vector<Real> largest(static_cast<std::size_t>(scene_.mesh.nodes()), std::numeric_limits<Real>::lowest());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const std::span<const Real> level_set = values(i);
+    for (std::size_t n = 0; n < largest.size(); ++n) largest[n] = std::max(largest[n], level_set[n]);
+  }
+  return largest;
 }
 
 bool FrontSet::part() {

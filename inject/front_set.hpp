@@ -37,6 +37,9 @@ class FrontSet {
   /// Whether air, or a fluid under a given pressure, can still leave or enter. Collective.
   bool has_way_out() const;
 
+  /// [node] the largest of the level sets: positive where some fluid has come. Local.
+  std::vector<Real> united() const;
+
   /// Where two fluids claim a node, the one with the larger level set keeps it: both take half the difference, with
   /// opposite signs, so that their fronts meet half-way (Merriman, Bence, Osher 1994). Returns whether there were any.
   /// Collective.

@@ -90,6 +90,7 @@ void FillingProcess::check_start() {
 }
 
 void FillingProcess::add_front() {
+  fronts_.set_initial();
   way_ = way_of_fronts(scene_, fronts_);
   std::function<void(Real)> renew;
   if (prescribed_) renew = [this](Real time) { prescribed_->evaluate(time); };

@@ -150,6 +150,11 @@ void Scene::rebuild() {
   }
 }
 
+bool Scene::is_opening(const BoundaryPart& part) const {
+  if (part.kind != BoundaryPart::Kind::imposed) return part.kind == BoundaryPart::Kind::vent;
+  return settings.common.boundaries[part.index].type != BoundarySettings::Type::symmetry;
+}
+
 std::vector<const BoundaryPart*> Scene::parts_of(BoundaryPart::Kind kind) const {
   std::vector<const BoundaryPart*> found;
   for (const BoundaryPart& part : parts) {

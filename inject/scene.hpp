@@ -52,6 +52,8 @@ struct Scene {
   std::vector<BoundaryPart> parts;
 
   std::vector<const BoundaryPart*> parts_of(BoundaryPart::Kind kind) const;
+  /// Whether air can go out through a part, or come in: a vent, or a [boundary] that is no symmetry.
+  bool is_opening(const BoundaryPart& part) const;
 };
 
 /// Flow out through facets [m^3/s] of a velocity field [node][dim]. Collective.

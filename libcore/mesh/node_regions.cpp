@@ -4,14 +4,12 @@
 #include <limits>
 #include <numeric>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
 
 constexpr Real no_label = std::numeric_limits<Real>::max();
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// [node] the lowest global number of a node of its region (exact as Real below 2^53).
 std::vector<Real> label_nodes(const Communicator& comm, const Mesh& mesh,

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 
+#include "base/index.hpp"
 #include "partition/balance.hpp"
 #include "remesh/interface_strip.hpp"
 #include "remesh/selection.hpp"
@@ -15,10 +16,6 @@ namespace malleus {
 namespace {
 
 constexpr const char* mark_field_name = "remeshing_mark";
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 class DistributedRemesher {
  public:

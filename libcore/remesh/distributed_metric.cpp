@@ -4,16 +4,13 @@
 #include <cmath>
 #include <map>
 
+#include "base/index.hpp"
 #include "parallel/sparse_exchange.hpp"
 #include "remesh/selection.hpp"
 #include "remesh/vertex_metric.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 /// Copies' metrics are intersected into their owners', in rank order, and come back alike to all.
 void level_metric(const Communicator& comm, const Mesh& mesh, Metric& metric) {

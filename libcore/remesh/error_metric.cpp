@@ -4,16 +4,13 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/index.hpp"
 #include "mesh/simplex.hpp"
 #include "remesh/distributed_metric.hpp"
 #include "remesh/symmetric_tensor.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 /// Means over the elements at each node, weighted by volume: of(element, into) adds `width` values. Collective.
 template <int D, class OfElement>

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 /// A number that orders the ranks differently in each round, no two alike; its low bits are the rank. Exact in a Real.
 Real drawn_number(int rank, int round) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/error.hpp"
+#include "base/index.hpp"
 #include "field/fielded_piece.hpp"
 #include "mesh/faces.hpp"
 #include "parallel/agreement.hpp"
@@ -10,10 +11,6 @@
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 /// What is cut out of a mesh, and what of the mesh is left around it.
 class Cut {

@@ -4,14 +4,11 @@
 #include <array>
 
 #include "base/error.hpp"
+#include "base/index.hpp"
 #include "field/fielded_piece.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId entity) {
-  return static_cast<std::size_t>(entity);
-}
 
 class Subdivision {
  public:

@@ -3,14 +3,11 @@
 #include <algorithm>
 
 #include "base/floating_point.hpp"
+#include "base/index.hpp"
 #include "solvers/petsc_objects.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// The velocity block as an AIJ matrix with its block size.
 PetscMatrix make_matrix(const Communicator& comm, const MultigridLevel& level) {

@@ -5,21 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "mesh/node_regions.hpp"
-
 namespace malleus {
 namespace {
-
-NodeRegions regions_outside(const Communicator& comm, const Mesh& mesh, std::span<const Real> level_set) {
-  std::array<LocalId, 4> nodes;
-  return connected_regions(comm, mesh, [&](LocalId element) {
-    std::size_t count = 0;
-    for (const LocalId node : mesh.nodes_of_element(element)) {
-      if (!(level_set[static_cast<std::size_t>(node)] > 0)) nodes[count++] = node;
-    }
-    return std::span<const LocalId>(nodes.data(), count);
-  });
-}
 
 /// [region] whether it is to be filled; the same on all ranks.
 std::vector<char> unresolved_regions(const Communicator& comm, const Mesh& mesh, const NodeRegions& regions,
@@ -38,6 +25,17 @@ std::vector<char> unresolved_regions(const Communicator& comm, const Mesh& mesh,
 }
 
 }  // namespace
+
+NodeRegions regions_outside(const Communicator& comm, const Mesh& mesh, std::span<const Real> level_set) {
+  std::array<LocalId, 4> nodes;
+  return connected_regions(comm, mesh, [&](LocalId element) {
+    std::size_t count = 0;
+    for (const LocalId node : mesh.nodes_of_element(element)) {
+      if (!(level_set[static_cast<std::size_t>(node)] > 0)) nodes[count++] = node;
+    }
+    return std::span<const LocalId>(nodes.data(), count);
+  });
+}
 
 int fill_unresolved_pockets(const Communicator& comm, const Mesh& mesh, std::span<const char> open,
                             std::span<Real> level_set) {

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "mesh/mesh.hpp"
+#include "mesh/node_regions.hpp"
 
 namespace malleus {
 
@@ -12,6 +13,9 @@ namespace malleus {
 constexpr int unresolved_nodes(int dim) {
   return dim == 2 ? 7 : 15;
 }
+
+/// Regions of nodes of level set <= 0 that hang together through elements. level_set: [node] m. Collective.
+NodeRegions regions_outside(const Communicator& comm, const Mesh& mesh, std::span<const Real> level_set);
 
 /// Makes the level set positive in each region of nodes of level set <= 0 that hangs together through elements, has
 /// at most unresolved_nodes() nodes, and has none that is marked open (where the outside can flow in or out). Along

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/index.hpp"
 #include "mesh/simplex.hpp"
 #include "mesh/space_filling_curve.hpp"
 #include "solvers/bordered_preconditioner.hpp"
@@ -17,10 +18,6 @@ constexpr Real least_slenderness = 4;
 constexpr Real development = 0.7;  ///< exchange at an opening, see the header
 /// Share of the mass matrix that keeps the block regular where the pressure is free.
 constexpr Real shift = 1e-7;
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// What the block is made of, before its solver.
 class Builder {

@@ -4,14 +4,11 @@
 #include <array>
 #include <cmath>
 
+#include "base/index.hpp"
 #include "solvers/graph_assembler.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Adds M(1/eta)/2 times a factor.
 void add_mass(const LinearSystem& system, Real factor, GraphAssembler<float>& assembler) {

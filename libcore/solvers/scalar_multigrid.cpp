@@ -4,12 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// y = A x on the owned rows; x has room for the copies and gets their values.
 void multiply(const ScalarMatrix& matrix, std::vector<Real>& x, std::vector<Real>& y) {

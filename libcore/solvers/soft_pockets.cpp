@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/index.hpp"
 #include "mesh/node_regions.hpp"
 #include "mesh/simplex.hpp"
 #include "solvers/viscosity_range.hpp"
@@ -13,10 +14,6 @@ namespace malleus {
 namespace {
 
 constexpr Real softness = 1.0 / 30.0;
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Below this an element is soft. Collective.
 Real soft_limit(const LinearSystem& system) {

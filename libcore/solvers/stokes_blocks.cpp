@@ -3,14 +3,11 @@
 #include <cmath>
 #include <memory>
 
+#include "base/index.hpp"
 #include "solvers/petsc_objects.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Block rows of one sequential part of a BAIJ matrix, for the lifetime of the object.
 class SequentialPart {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/index.hpp"
 #include "solvers/bordered_preconditioner.hpp"
 #include "solvers/gamg_velocity.hpp"
 #include "solvers/viscosity_range.hpp"
@@ -15,10 +16,6 @@ namespace {
 
 constexpr Real rigid_contrast = 30;
 constexpr Real double_contrast = 1e6;
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// The finest level of the velocity block; takes the values and copies layout and graph.
 MultigridLevel finest_level(const LinearSystem& system, StokesBlocks& blocks) {

@@ -41,6 +41,14 @@ NodeConstraints wall_constraints(const Mesh& mesh, bool is_open) {
 
 }  // namespace
 
+LinearVector right_side_of(StokesOperator& equations, const StokesState& state) {
+  LinearVector right_side;
+  equations.residual(state, right_side);
+  for (Real& value : right_side.nodes) value = -value;
+  for (Real& value : right_side.borders) value = -value;
+  return right_side;
+}
+
 std::vector<Sphere> spread_spheres(int count, bool disjoint) {
   std::uint32_t state = 12345;
   const auto next = [&] {
@@ -90,9 +98,7 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   equations_->prepare();
   StokesState state = equations_->start_state();
   equations_->update_viscosity(state);
-  equations_->residual(state, right_side_);
-  for (Real& value : right_side_.nodes) value = -value;
-  for (Real& value : right_side_.borders) value = -value;
+  right_side_ = right_side_of(*equations_, state);
   system_ = &equations_->tangent(state, false);
 }
 

@@ -9,6 +9,9 @@
 
 namespace malleus::test {
 
+/// What a linear solver starts from at a state: the residual with the other sign. Collective.
+LinearVector right_side_of(StokesOperator& equations, const StokesState& state);
+
 struct Sphere {
   std::array<Real, 3> center{};
   Real radius = 0;

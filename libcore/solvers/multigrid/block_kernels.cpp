@@ -3,12 +3,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// A column of a block is read as a whole register of `Lanes` numbers; lanes beyond the block hold its neighbour's
 /// numbers and are never stored.

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 template <int Rows, int Columns = Rows>
 using Block = Eigen::Matrix<Real, Rows, Columns>;

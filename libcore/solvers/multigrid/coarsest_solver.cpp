@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/index.hpp"
+
 namespace malleus {
 namespace {
 
 constexpr GlobalId direct_unknowns = 3000;
 constexpr int sweeps = 16;
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 Eigen::MatrixXd to_dense(const MultigridLevel& level) {
   const int block = level.values.rows;

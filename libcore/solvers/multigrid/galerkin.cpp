@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <map>
 
+#include "base/index.hpp"
 #include "parallel/sparse_exchange.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 template <int Rows, int Columns>
 using BlockView = Eigen::Map<Eigen::Matrix<Real, Rows, Columns>>;

@@ -4,16 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/index.hpp"
 #include "solvers/multigrid/block_kernels.hpp"
 #include "solvers/multigrid/coarsest_solver.hpp"
 #include "solvers/multigrid/galerkin.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(LocalId i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// A level in the precision of the cycle.
 template <class T>

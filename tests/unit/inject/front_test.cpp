@@ -32,6 +32,7 @@ TEST(Front, OfAPlugFlowStartsAtTheGateAndFillsWhatEnters) {
     PlugFlow plug(settings, dim);
     Front front(plug.scene, plug.fronts, plug.state, {});
     Filling filling(plug.scene, plug.fronts, plug.state);
+    plug.fronts.set_initial();
     front.start();
     EXPECT_EQ(plug.state.initial, 0);
     Real time = 0;
@@ -64,6 +65,7 @@ TEST(Front, ClosesTheVentAndLosesNothingThroughIt) {
   PlugFlow plug(settings, 2);
   Front front(plug.scene, plug.fronts, plug.state, {});
   Filling filling(plug.scene, plug.fronts, plug.state);
+  plug.fronts.set_initial();
   front.start();
   EXPECT_TRUE(plug.fronts.has_way_out());
   const Increment increment{1, 1.9995, 1.9995};
@@ -78,6 +80,7 @@ TEST(Front, RollsBack) {
   const InjectCase settings = test::box_case(2, WallSettings::Condition::slip);
   PlugFlow plug(settings, 2);
   Front front(plug.scene, plug.fronts, plug.state, {});
+  plug.fronts.set_initial();
   front.start();
   front.advance({1, 0.4, 0.4});
   const auto values = plug.fronts.values(0);
@@ -111,6 +114,7 @@ TEST(Front, StartsWithShapesAndKeepsTheirVolumeInAClosedFlow) {
     velocity.at(n)[1] = 0.5 * std::cos(x) * std::sin(y);
   }
   Front front(plug.scene, plug.fronts, plug.state, {});
+  plug.fronts.set_initial();
   front.start();
   const Real volume = plug.state.initial;
   EXPECT_NEAR(volume, std::numbers::pi * 0.09, 0.02);

@@ -224,10 +224,7 @@ TEST(StokesLinearSolver, GatesOfUnknownPressureCostNothing) {
   equations.prepare();
   StokesState state = equations.start_state();
   equations.update_viscosity(state);
-  LinearVector right_side;
-  equations.residual(state, right_side);
-  for (Real& value : right_side.nodes) value = -value;
-  for (Real& value : right_side.borders) value = -value;
+  const LinearVector right_side = test::right_side_of(equations, state);
   const LinearSystem& system = equations.tangent(state, false);
   LinearVector exact;
   ASSERT_TRUE(StokesLinearSolver({.method = LinearMethod::direct}).solve(system, right_side, 1e-12, exact).converged);

@@ -7,6 +7,7 @@
 #include "fem/boundary_conditions.hpp"
 #include "solvers/stokes_linear_solver.hpp"
 #include "support/box_mesh.hpp"
+#include "support/stokes_cavity.hpp"
 #include "support/world.hpp"
 
 namespace malleus {
@@ -65,10 +66,7 @@ int iterations_through(const Strip& strip) {
   equations.prepare();
   const StokesState state = equations.start_state();
   equations.update_viscosity(state);
-  LinearVector right_side;
-  equations.residual(state, right_side);
-  for (Real& value : right_side.nodes) value = -value;
-  for (Real& value : right_side.borders) value = -value;
+  const LinearVector right_side = test::right_side_of(equations, state);
   const LinearSystem& system = equations.tangent(state, false);
   LinearVector solution;
   const LinearOutcome outcome = StokesLinearSolver({.fall_back = false}).solve(system, right_side, 1e-6, solution);
