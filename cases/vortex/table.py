@@ -20,7 +20,7 @@ def velocity(points, time):
     return np.stack([-np.sin(x) ** 2 * np.sin(2 * y), np.sin(y) ** 2 * np.sin(2 * x)], axis=1) * swirl
 
 
-def exact_level_set(points, time, steps=800):
+def exact_level_set(points, time, steps=200):
     """The disc's distance at the place from which each point has come: traced back by Runge-Kutta 4."""
     dt, p = -time / steps, points.copy()
     for k in range(steps):

@@ -342,9 +342,11 @@ void Engine::finish(const std::string& status, int code) {
     log::warning("command line: nothing asked for the PETSc option {}", option);
   }
   if (last_output_ != last_.number || code == exit_code::numerics) write_fields(last_.number);
-  write_summary(status, code);
+  const ErrorBudget budget = process_.error_budget();
+  write_summary(status, code, budget);
   print_timings();
   for (const std::string& line : process_.closing_lines()) log::info("{}", line);
+  for (const std::string& line : budget.lines()) log::info("{}", line);
   const Forecast forecast = process_.forecast();
   if (code == exit_code::done && last_.number > 0) {
     log::info("took {} increments, {:.1f} s and {:.0f} MiB; the forecast was {}, {:.1f} s and {:.0f} MiB", last_.number,
@@ -365,10 +367,14 @@ void Engine::print_timings() {
   report::print_timings(comm_, rows, wall_clock() - started_at_);
 }
 
-void Engine::write_summary(const std::string& status, int code) {
+void Engine::write_summary(const std::string& status, int code, const ErrorBudget& budget) {
   std::vector<report::ComponentTime> rows;
   for (const Timing& t : timings_) rows.push_back({t.name, t.calls, t.wall_s});
   nlohmann::json summary = report::summary(comm_, process_, settings_, rows);
+  if (!budget.empty()) {
+    summary["accuracy"]["estimated_error"] = budget.total();
+    summary["accuracy"]["error_budget"] = budget.json();
+  }
   summary["status"] = status;
   summary["exit_code"] = code;
   summary["reason"] = end_reason_;

@@ -72,7 +72,7 @@ class Engine {
   bool checkpoint_is_due() const;
   std::string reason_to_stop();
   void finish(const std::string& status, int code);
-  void write_summary(const std::string& status, int code);
+  void write_summary(const std::string& status, int code, const ErrorBudget& budget);
   void print_timings();
   Timing& timing(const std::string& name);
   template <class Work>

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/component.hpp"
+#include "engine/error_budget.hpp"
 #include "engine/probes.hpp"
 #include "field/field.hpp"
 #include "mesh/mesh.hpp"
@@ -76,7 +77,9 @@ class Process {
   virtual std::string increment_note() const = 0;  ///< the process' part of the log line of an increment
   virtual LinearTotals linear_totals() const = 0;
   virtual nlohmann::json accuracy() = 0;                           ///< object `accuracy` of summary.json
-  virtual std::vector<std::string> closing_lines() { return {}; }  ///< error budget: the last lines of the log
+  virtual std::vector<std::string> closing_lines() { return {}; }  ///< before the error budget at the end of the log
+  /// Sources of error that the process can tell at the end of a run, each once; the engine adds that of space.
+  virtual ErrorBudget error_budget() { return {}; }
 
   /// @name Checkpoints: what is not in mesh and fields. Numbers survive bit for bit.
   /// @{
