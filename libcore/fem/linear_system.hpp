@@ -24,7 +24,7 @@ struct BorderColumn {
 /// Unknowns and equations of a linear solve.
 ///
 ///     [ A   B^T  g ] [dv]   [r_v]      A symmetric positive on the free directions (viscous, friction, penalty)
-///     [ B   -C   0 ] [dp] = [r_p]      B = -(q, div v): r_p in m^3/s times the scale
+///     [ B+E -C   0 ] [dp] = [r_p]      B = -(q, div v): r_p in m^3/s times the scale; E of Newton's tangent only
 ///     [ g^T  0   d ] [dq]   [r_q]      C from the subscales, >= 0
 ///
 /// `matrix` holds [A B^T; B -C] in blocks of dim+1 a node, (v_1..v_dim, p): MATSEQBAIJ on one rank, MATMPIBAIJ on

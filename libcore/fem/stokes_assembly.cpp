@@ -201,15 +201,20 @@ void StokesOperator::choose_branches(Branches choice, const StokesState& state) 
 }
 
 template <class Element>
-void StokesOperator::add_element_matrices(const StokesState& state, bool newton) {
+void StokesOperator::add_element_matrices(const StokesState& state, Tangent kind) {
   constexpr int D = Element::dim;
   ElementMatrix<D> local;
   for (LocalId e = 0; e < mesh_->elements(); ++e) {
     const auto i = static_cast<std::size_t>(e);
     if (!(viscosity_[i] > 0)) continue;
     const Element element(simplex_points<D>(*mesh_, e));
-    const auto velocity = gather<D>(*mesh_, e, state.nodes).velocity;
-    element.matrix(velocity, viscosity_[i], newton ? slope_[i] : 0, system_.pressure_scale, local);
+    const auto unknowns = gather<D>(*mesh_, e, state.nodes);
+    const Real slope = kind == Tangent::picard ? 0 : slope_[i];
+    const TangentFactors factors{viscosity_[i], slope, system_.pressure_scale};
+    element.matrix(unknowns.velocity, factors, local);
+    if (kind == Tangent::newton && slope != 0) {
+      element.add_subscale_slope(unknowns, element_load<Element>(e), factors, local);
+    }
     const auto nodes = mesh_->nodes_of_element(e);
     bool constrained = false;
     for (const LocalId node : nodes) constrained = constrained || !constraints_.is_free(node);
@@ -236,11 +241,11 @@ void StokesOperator::scale_borders() {
   }
 }
 
-const LinearSystem& StokesOperator::tangent(const StokesState& state, bool newton) {
+const LinearSystem& StokesOperator::tangent(const StokesState& state, Tangent kind) {
   if (!scale_is_chosen_) choose_scale();
   matrix_->start();
   with_element(mesh_->dim, geometry_,
-               [&]<class Element>(std::type_identity<Element>) { add_element_matrices<Element>(state, newton); });
+               [&]<class Element>(std::type_identity<Element>) { add_element_matrices<Element>(state, kind); });
   if (!terms_.empty()) {
     const std::vector<Real> unknowns = unknowns_in_space(state);
     TangentSink sink(extended_constraints_, *matrix_);

@@ -116,9 +116,10 @@ ElementUnknowns<2> AxisymmetricMiniElement::load(const ElementLoad<2>& load, Rea
   return result;
 }
 
-void AxisymmetricMiniElement::matrix(const Eigen::Matrix<Real, 2, 3>& velocity, Real viscosity, Real slope, Real scale,
+void AxisymmetricMiniElement::matrix(const Eigen::Matrix<Real, 2, 3>& velocity, const TangentFactors& factors,
                                      ElementMatrix<2>& result) const {
   const Eigen::Map<const Velocity> v(velocity.data());
+  const auto [viscosity, slope, scale] = factors;
   Eigen::Matrix<Real, 6, 6> viscous = viscosity * stiffness_;
   if (slope != 0) {
     const Velocity force = stiffness_ * v;
@@ -131,6 +132,22 @@ void AxisymmetricMiniElement::matrix(const Eigen::Matrix<Real, 2, 3>& velocity, 
       block.bottomLeftCorner<1, 2>() = scale * divergence_.block<1, 2>(a, 2 * b);
       block.topRightCorner<2, 1>() = scale * divergence_.block<1, 2>(b, 2 * a).transpose();
       block(2, 2) = -scale * scale / viscosity * compliance_(a, b);
+    }
+  }
+}
+
+void AxisymmetricMiniElement::add_subscale_slope(const ElementUnknowns<2>& unknowns, const ElementLoad<2>& load,
+                                                 const TangentFactors& factors, ElementMatrix<2>& result) const {
+  const auto [viscosity, slope, scale] = factors;
+  const Eigen::Map<const Velocity> v(unknowns.velocity.data());
+  const Eigen::Map<const Velocity> density(load.force.data());
+  const Eigen::Matrix<Real, 3, 1> flow =
+      scale * slope / (viscosity * viscosity) * (compliance_ * unknowns.pressure - bubble_load_ * density);
+  const Velocity rate_gradients = stiffness_ * v / volume_;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      auto& block = result.blocks[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
+      block.bottomLeftCorner<1, 2>() += flow[a] * rate_gradients.segment<2>(2 * b).transpose();
     }
   }
 }

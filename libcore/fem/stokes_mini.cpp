@@ -58,8 +58,9 @@ Point<D> MiniElement<D>::subscale_velocity(const ElementUnknowns<D>& unknowns, c
 }
 
 template <int D>
-void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real viscosity, Real slope, Real scale,
+void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, const TangentFactors& factors,
                             ElementMatrix<D>& result) const {
+  const auto [viscosity, slope, scale] = factors;
   const Eigen::Matrix<Real, D, D + 1> stress_gradients = viscosity * volume_ * gradients_;
   const Eigen::Matrix<Real, D, D + 1> coupling = -scale * volume_ / (D + 1) * gradients_;
   const Eigen::Matrix<Real, D, D + 1> subscale_gradients = (-scale * scale / viscosity) * (subscale_ * gradients_);
@@ -76,6 +77,22 @@ void MiniElement<D>::matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real 
       block.template bottomLeftCorner<1, D>() = coupling.col(b).transpose();
       block(D, D) = gradients_.col(a).dot(subscale_gradients.col(b));
       if (a != b) result.blocks[static_cast<std::size_t>(b)][static_cast<std::size_t>(a)] = block.transpose();
+    }
+  }
+}
+
+template <int D>
+void MiniElement<D>::add_subscale_slope(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load,
+                                        const TangentFactors& factors, ElementMatrix<D>& result) const {
+  const auto [viscosity, slope, scale] = factors;
+  const Point<D> imbalance = gradients_ * unknowns.pressure - load.force.rowwise().mean();
+  const Eigen::Matrix<Real, D + 1, 1> flow =
+      scale * slope / (viscosity * viscosity) * (gradients_.transpose() * (subscale_ * imbalance));
+  const Eigen::Matrix<Real, D, D + 1> rate_gradients = 2 * strain_rate(unknowns.velocity) * gradients_;
+  for (int a = 0; a <= D; ++a) {
+    for (int b = 0; b <= D; ++b) {
+      auto& block = result.blocks[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
+      block.template bottomLeftCorner<1, D>() += flow[a] * rate_gradients.col(b).transpose();
     }
   }
 }

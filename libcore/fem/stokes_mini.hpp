@@ -30,6 +30,13 @@ struct ElementMatrix {
   std::array<std::array<Block, D + 1>, D + 1> blocks;
 };
 
+/// Of an element in a tangent: eta [Pa.s], (d eta / d gamma) / gamma [Pa.s^3], scale of rows of the pressure.
+struct TangentFactors {
+  Real viscosity = 1;
+  Real slope = 0;
+  Real scale = 1;
+};
+
 /// c of the subscales, see MiniElement. (D + 1)^2 / (12 D): 3/8 and 4/9; the bubble alone has 1/20 and 9/420.
 template <int D>
 inline constexpr Real subscale_share = (D + 1.0) * (D + 1.0) / (12.0 * D);
@@ -68,11 +75,15 @@ class MiniElement {
   /// Mean v' [m/s] of an element, T (f - grad p); for an axisymmetric scene that of the same section.
   Point<D> subscale_velocity(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load, Real viscosity) const;
 
-  /// Derivative of residual() with C frozen (else it were not symmetric): A of the viscosity, and
+  /// Derivative of residual() with T frozen, which is symmetric: A of the viscosity, and
   /// slope 4 V (eps(v):eps(dv)) (eps(v):eps(w)); slope 0 gives Picard's matrix. Columns and rows of the pressure are
   /// multiplied by `scale`.
-  void matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, Real viscosity, Real slope, Real scale,
+  void matrix(const Eigen::Matrix<Real, D, D + 1>& velocity, const TangentFactors& factors,
               ElementMatrix<D>& result) const;
+  /// Adds what is missing to the derivative of residual() - load(): T follows the viscosity, so in the rows of the
+  /// pressures -integral grad q . T (f - grad p) (d eta / eta), d eta = slope 2 eps(v):eps(dv).
+  void add_subscale_slope(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load, const TangentFactors& factors,
+                          ElementMatrix<D>& result) const;
 
  private:
   Eigen::Matrix<Real, D, D> strain_rate(const Eigen::Matrix<Real, D, D + 1>& velocity) const;
@@ -98,8 +109,9 @@ class AxisymmetricMiniElement {
   Real shear_rate(const Eigen::Matrix<Real, 2, 3>& velocity) const;
   ElementUnknowns<2> residual(const ElementUnknowns<2>& unknowns, Real viscosity, Real bubble_viscosity) const;
   ElementUnknowns<2> load(const ElementLoad<2>& load, Real bubble_viscosity) const;
-  void matrix(const Eigen::Matrix<Real, 2, 3>& velocity, Real viscosity, Real slope, Real scale,
-              ElementMatrix<2>& result) const;
+  void matrix(const Eigen::Matrix<Real, 2, 3>& velocity, const TangentFactors& factors, ElementMatrix<2>& result) const;
+  void add_subscale_slope(const ElementUnknowns<2>& unknowns, const ElementLoad<2>& load, const TangentFactors& factors,
+                          ElementMatrix<2>& result) const;
 
  private:
   using Velocity = Eigen::Matrix<Real, 6, 1>;

@@ -52,6 +52,11 @@ struct ResidualReport {
   Real net_flow = 0;
 };
 
+/// What a matrix is the derivative of. `newton` is consistent, and then B of the lower left block also has how the
+/// subscales follow the viscosity; `symmetric` leaves that out, for methods that rely on symmetry: Newton's method then
+/// converges linearly in the end, by about 1/27 a step.
+enum class Tangent { picard, symmetric, newton };
+
 /// The node with the largest residual of force.
 struct WorstNode {
   Real force = 0;               ///< N
@@ -115,8 +120,8 @@ class StokesOperator {
   /// The residual at the current viscosities, scaled and projected as LinearSystem says (the right side of a step is
   /// its negative). Collective.
   ResidualReport residual(const StokesState& state, LinearVector& result);
-  /// The matrix at the current viscosities: Picard's, or Newton's consistent tangent. Collective.
-  const LinearSystem& tangent(const StokesState& state, bool newton);
+  /// The matrix at the current viscosities. Collective.
+  const LinearSystem& tangent(const StokesState& state, Tangent kind);
   /// Adds a factor times the step's velocities, and another times its pressures and borders, scales undone; copies
   /// updated. Collective.
   void add_step(const LinearVector& step, Real velocity_factor, Real pressure_factor, StokesState& state) const;
@@ -168,7 +173,7 @@ class StokesOperator {
   void add_tractions(Balance& sums) const;
   void add_terms(std::span<const Real> unknowns, Balance& sums) const;
   template <class Element>
-  void add_element_matrices(const StokesState& state, bool newton);
+  void add_element_matrices(const StokesState& state, Tangent kind);
   void scale_borders();
 
   const Communicator* comm_;

@@ -13,8 +13,7 @@ namespace {
 /// Below this sensitivity Newton needs a start nearer to the solution than one linear solve gives.
 constexpr Real picard_sensitivity = 0.3;
 constexpr int picard_steps = 3;
-/// Linear solves: the loosest, and gamma of Eisenstat and Walker's second choice (exponent 2).
-constexpr Real loosest_forcing = 1e-2;
+/// Linear solves: gamma of Eisenstat and Walker's second choice (exponent 2).
 constexpr Real forcing_factor = 0.9;
 /// Linear problems: solves that bring the flow through the gates to the tolerance, and how far each goes.
 constexpr int most_refinements = 4;
@@ -62,7 +61,7 @@ class Loop {
   LinearVector residual_;
   ResidualReport report_;
   LinearVector step_;
-  Real forcing_ = loosest_forcing;
+  Real forcing_ = options_.largest_forcing;
 };
 
 void Loop::evaluate() {
@@ -75,7 +74,8 @@ void Loop::evaluate() {
 /// Solves for a step at the current residual. False where the linear solver failed.
 bool Loop::compute_step(bool newton, Real tolerance) {
   const Stopwatch watch;
-  const LinearSystem& system = op_.tangent(state_, newton);
+  const Tangent smooth = linear_.needs_symmetry() ? Tangent::symmetric : Tangent::newton;
+  const LinearSystem& system = op_.tangent(state_, newton ? smooth : Tangent::picard);
   outcome_.assembly_seconds += watch.seconds();
   LinearVector right_side = residual_;
   for (Real& value : right_side.nodes) value = -value;
@@ -147,7 +147,7 @@ Real Loop::forcing(Real previous_norm) {
   if (previous_norm > 0) {
     const Real ratio = sound_norm() / previous_norm;
     const Real guard = forcing_factor * forcing_ * forcing_;
-    forcing_ = std::min(loosest_forcing, forcing_factor * ratio * ratio);
+    forcing_ = std::min(options_.largest_forcing, forcing_factor * ratio * ratio);
     if (guard > 0.1) forcing_ = std::max(forcing_, guard);
   }
   const Real wanted = options_.tolerance * report_.reference / report_.norm;
@@ -225,7 +225,7 @@ void Loop::solve_nonlinear_problem() {
     choose_branches(iteration, cold);
     const bool newton = !first && picard_left <= 0 && !options_.picard_alone;
     if (!first && !newton) --picard_left;
-    const Real tolerance = newton ? forcing(previous_norm) : loosest_forcing;
+    const Real tolerance = newton ? forcing(previous_norm) : options_.largest_forcing;
     previous_norm = newton ? sound_norm() : 0;
     if (!compute_step(newton, tolerance * sound_norm() / report_.norm)) return;
     StokesState full = state_;

@@ -94,6 +94,8 @@ class StokesLinearSolver::Implementation {
     return outcome;
   }
 
+  bool needs_symmetry() const { return options_.method == LinearMethod::conjugate_residual; }
+
   void reset() {
     setup_.reset();
     first_step_ = 0;
@@ -191,6 +193,10 @@ StokesLinearSolver::~StokesLinearSolver() = default;
 LinearOutcome StokesLinearSolver::solve(const LinearSystem& system, const LinearVector& right_side, Real tolerance,
                                         LinearVector& solution) {
   return implementation_->solve(system, right_side, tolerance, solution);
+}
+
+bool StokesLinearSolver::needs_symmetry() const {
+  return implementation_->needs_symmetry();
 }
 
 void StokesLinearSolver::reset() {

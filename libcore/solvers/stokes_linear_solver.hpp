@@ -65,6 +65,9 @@ class StokesLinearSolver {
   LinearOutcome solve(const LinearSystem& system, const LinearVector& right_side, Real tolerance,
                       LinearVector& solution);
 
+  /// Whether the method chosen asks for symmetric systems.
+  bool needs_symmetry() const;
+
   /// Forgets the hierarchy, as after a remesh. The next solve builds a new one.
   void reset();
 

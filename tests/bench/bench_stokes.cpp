@@ -1,8 +1,10 @@
-/// Measures the Stokes linear solver on lid cavities: iterations, seconds, matrix products, bytes.
+/// Measures the Stokes linear solver on lid cavities: iterations, seconds, matrix products, bytes; with m < 1 Newton's
+/// method on a cube between platens that stick.
 ///
 /// usage: bench_stokes [name=value]... [-- PETSC OPTIONS]
 ///   cells=33 (along each axis; 33, 50, 66, 96: 39k, 133k, 301k, 913k nodes)  dim=3  jitter=0.2  tolerance=1e-6
-///   spheres=0 inside=1 (their viscosity; < 1 soft)  disjoint=0  open=0
+///   m=1 (rate sensitivity)  cut_off=0.01 (over speed / height)  spheres=0 inside=1 (their viscosity; < 1 soft)
+///   disjoint=0  open=0
 
 #include <fmt/format.h>
 
@@ -13,8 +15,10 @@
 #include <string>
 
 #include "parallel/session.hpp"
+#include "solvers/newton.hpp"
 #include "solvers/petsc_objects.hpp"
 #include "solvers/stokes_linear_solver.hpp"
+#include "support/sticking_block.hpp"
 #include "support/stokes_cavity.hpp"
 
 namespace malleus {
@@ -53,13 +57,42 @@ Real seconds_of_product(Mat matrix) {
   return (processor_seconds() - start) / products;
 }
 
-int run(const Communicator& comm, std::map<std::string, Real> values) {
+using Values = std::map<std::string, Real>;
+
+test::BoxMeshOptions box_of(const Values& values) {
+  const int cells = static_cast<int>(values.at("cells"));
+  return {.dim = static_cast<int>(values.at("dim")), .cells = {cells, cells, cells}, .jitter = values.at("jitter")};
+}
+
+int run_nonlinear(const Communicator& comm, const Values& values) {
+  test::StickingBlock block(comm, box_of(values), values.at("m"), values.at("cut_off"));
+  StokesState state = block.op.start_state();
+  StokesLinearSolver linear;
+  const NewtonSolver newton({.tolerance = values.at("tolerance"), .start_shear_rate = 1});
+  const Real start = processor_seconds();
+  const NewtonOutcome outcome = newton.solve(block.op, linear, state);
+  const Real processor = comm.max(processor_seconds() - start);
+  if (comm.is_root()) {
+    fmt::print("nodes {} ranks {} m {} cut-off {:.0e} tolerance {:.0e}: {} {} nonlinear, {} linear iterations\n",
+               block.mesh.total_nodes(), comm.size(), values.at("m"), values.at("cut_off"), values.at("tolerance"),
+               outcome.converged ? "converged," : "FAILED,", outcome.iterations(), outcome.linear_iterations);
+    for (const NewtonIteration& step : outcome.history) {
+      fmt::print("  {:>7} residual {:.2e} step {:.3f} linear iterations {:3} to {:.1e}\n",
+                 step.newton ? "Newton" : "Picard", step.residual, step.step, step.linear_iterations,
+                 step.linear_residual);
+    }
+    fmt::print("  wall: assembly {:.2f} s, set-up {:.2f} s, solve {:.2f} s; processor {:.2f} s\n",
+               outcome.assembly_seconds, outcome.setup_seconds, outcome.solve_seconds, processor);
+  }
+  return outcome.converged ? 0 : 3;
+}
+
+int run_linear(const Communicator& comm, const Values& values) {
   test::CavityOptions options;
-  const int cells = static_cast<int>(values["cells"]);
-  options.box = {.dim = static_cast<int>(values["dim"]), .cells = {cells, cells, cells}, .jitter = values["jitter"]};
-  options.spheres = test::spread_spheres(static_cast<int>(values["spheres"]), values["disjoint"] > 0);
-  options.inside = values["inside"];
-  options.is_open = values["open"] > 0;
+  options.box = box_of(values);
+  options.spheres = test::spread_spheres(static_cast<int>(values.at("spheres")), values.at("disjoint") > 0);
+  options.inside = values.at("inside");
+  options.is_open = values.at("open") > 0;
   const auto start = Clock::now();
   const test::StokesCavity cavity(comm, options);
   const Real assembly = seconds_since(start);
@@ -68,13 +101,13 @@ int run(const Communicator& comm, std::map<std::string, Real> values) {
   const Real solver_start = processor_seconds();
   StokesLinearSolver solver;
   LinearVector solution;
-  const LinearOutcome outcome = solver.solve(cavity.system(), cavity.right_side(), values["tolerance"], solution);
+  const LinearOutcome outcome = solver.solve(cavity.system(), cavity.right_side(), values.at("tolerance"), solution);
   const Real processor = comm.max(processor_seconds() - solver_start);
   const Real peak = comm.sum(status_bytes("VmHWM"));
   const auto nodes = static_cast<Real>(cavity.mesh().total_nodes());
   if (comm.is_root()) {
     fmt::print("nodes {} ranks {} inside {:.0e} tolerance {:.0e}: {} {} iterations, residual {:.2e}\n",
-               cavity.mesh().total_nodes(), comm.size(), options.inside, values["tolerance"],
+               cavity.mesh().total_nodes(), comm.size(), options.inside, values.at("tolerance"),
                outcome.converged ? "converged," : "FAILED,", outcome.iterations, outcome.residual);
     fmt::print("  wall: mesh + assembly {:.2f} s, set-up {:.2f} s, solve {:.2f} s\n", assembly, outcome.setup_seconds,
                outcome.solve_seconds);
@@ -90,8 +123,9 @@ int run(const Communicator& comm, std::map<std::string, Real> values) {
 }  // namespace malleus
 
 int main(int argc, char** argv) {
-  std::map<std::string, malleus::Real> values = {{"cells", 33},  {"dim", 3},    {"jitter", 0.2}, {"tolerance", 1e-6},
-                                                 {"spheres", 0}, {"inside", 1}, {"disjoint", 0}, {"open", 0}};
+  std::map<std::string, malleus::Real> values = {{"cells", 33},  {"dim", 3},       {"jitter", 0.2}, {"tolerance", 1e-6},
+                                                 {"spheres", 0}, {"inside", 1},    {"disjoint", 0}, {"open", 0},
+                                                 {"m", 1},       {"cut_off", 0.01}};
   std::vector<std::string> petsc_options;
   bool is_for_petsc = false;
   for (int i = 1; i < argc; ++i) {
@@ -109,5 +143,6 @@ int main(int argc, char** argv) {
     }
   }
   const malleus::Session session(argc, argv, petsc_options);
-  return malleus::run(session.world(), values);
+  return values.at("m") == 1 ? malleus::run_linear(session.world(), values)
+                             : malleus::run_nonlinear(session.world(), values);
 }

@@ -99,7 +99,7 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   StokesState state = equations_->start_state();
   equations_->update_viscosity(state);
   right_side_ = right_side_of(*equations_, state);
-  system_ = &equations_->tangent(state, false);
+  system_ = &equations_->tangent(state, Tangent::picard);
 }
 
 }  // namespace malleus::test

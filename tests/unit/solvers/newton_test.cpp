@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "fem/boundary_conditions.hpp"
-#include "support/box_mesh.hpp"
+#include "support/sticking_block.hpp"
 #include "support/world.hpp"
 
 namespace malleus {
@@ -91,26 +91,11 @@ TEST(Newton, FrictionlessUpsettingIsExact) {
   }
 }
 
-/// A square block between sticking platens that close at speed 1; cut-off a hundredth of V/H.
-struct Sticking {
+/// Its cut-off is a hundredth of V/H.
+struct Sticking : test::StickingBlock {
   explicit Sticking(Real sensitivity)
-      : mesh(box_mesh(world(), {.dim = 2, .cells = {12, 12, 1}, .jitter = 0.15})), op(world(), mesh, Geometry::plane) {
-    std::vector<std::unique_ptr<const ViscousLaw>> laws;
-    laws.push_back(std::make_unique<NortonHoffLaw>(NortonHoff{2, sensitivity, 1e-2}));
-    model = std::make_unique<RegionViscosity>(std::move(laws));
-    std::vector<BoundaryCondition> conditions(2);
-    conditions[0].group = mesh.find_group("y_low");
-    conditions[1].group = mesh.find_group("y_high");
-    conditions[1].kind = ConditionKind::velocity;
-    conditions[1].velocity = {Expression(0), Expression(-1), std::nullopt};
-    op.set_viscosity(*model);
-    op.set_constraints(make_constraints(world(), mesh, Geometry::plane, conditions, 0));
-    op.prepare();
-  }
+      : StickingBlock(world(), {.dim = 2, .cells = {12, 12, 1}, .jitter = 0.15}, sensitivity, 1e-2) {}
 
-  Mesh mesh;
-  std::unique_ptr<RegionViscosity> model;
-  StokesOperator op;
   StokesLinearSolver linear{direct_solves()};
 };
 
@@ -191,6 +176,27 @@ TEST(Newton, ConvergesFromAColdStartAtAnySensitivity) {
     // a good first guess is not thrown away
     const NewtonOutcome again = NewtonSolver({.tolerance = 1e-6}).solve(block.op, block.linear, state);
     EXPECT_EQ(again.iterations(), 0);
+  }
+}
+
+/// The error of each of the last steps is of the order of the square of that before, also where subscales carry flow.
+TEST(Newton, ConvergesQuadratically) {
+  for (const Real sensitivity : {0.5, 0.2}) {
+    Sticking block(sensitivity);
+    StokesState state = block.op.start_state();
+    const NewtonOutcome outcome =
+        NewtonSolver({.tolerance = 1e-11, .linear_tolerance = 1e-13, .largest_forcing = 1e-8, .start_shear_rate = 1})
+            .solve(block.op, block.linear, state);
+    ASSERT_TRUE(outcome.converged) << outcome.reason;
+    int quadratic = 0;
+    for (std::size_t i = 1; i < outcome.history.size(); ++i) {
+      const Real before = outcome.history[i - 1].residual;
+      const Real after = outcome.history[i].residual;
+      if (before > 1e-2 || before < 1e-7) continue;
+      EXPECT_LT(after, 30 * before * before) << "m = " << sensitivity << ", iteration " << i;
+      ++quadratic;
+    }
+    EXPECT_GE(quadratic, 1) << "m = " << sensitivity;
   }
 }
 

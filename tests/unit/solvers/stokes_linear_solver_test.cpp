@@ -225,7 +225,7 @@ TEST(StokesLinearSolver, GatesOfUnknownPressureCostNothing) {
   StokesState state = equations.start_state();
   equations.update_viscosity(state);
   const LinearVector right_side = test::right_side_of(equations, state);
-  const LinearSystem& system = equations.tangent(state, false);
+  const LinearSystem& system = equations.tangent(state, Tangent::picard);
   LinearVector exact;
   ASSERT_TRUE(StokesLinearSolver({.method = LinearMethod::direct}).solve(system, right_side, 1e-12, exact).converged);
   for (const LinearMethod method : {LinearMethod::block_triangular, LinearMethod::conjugate_residual}) {

@@ -67,7 +67,7 @@ int iterations_through(const Strip& strip) {
   const StokesState state = equations.start_state();
   equations.update_viscosity(state);
   const LinearVector right_side = test::right_side_of(equations, state);
-  const LinearSystem& system = equations.tangent(state, false);
+  const LinearSystem& system = equations.tangent(state, Tangent::picard);
   LinearVector solution;
   const LinearOutcome outcome = StokesLinearSolver({.fall_back = false}).solve(system, right_side, 1e-6, solution);
   if (world().is_root())
