@@ -333,6 +333,13 @@ Real ForgeProcess::volume_change() const {
   return start > 0 ? scene_->deformable_volume() / start - 1 : 0;
 }
 
+/// The forces on tools, masters and driven boundaries [N].
+std::vector<Real> ForgeProcess::results() {
+  std::vector<Real> forces;
+  for (const Opponent& one : opponents()) forces.push_back(force_on(one).norm());
+  return forces;
+}
+
 std::string ForgeProcess::increment_note() const {
   const FlowReport& report = flow_.report();
   std::string note = fmt::format("newton {}", report.newton_iterations);

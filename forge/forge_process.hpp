@@ -25,6 +25,7 @@ class ForgeProcess final : public Process {
   std::vector<std::string> output_fields() const override;
   Real largest_step() override;
   std::optional<std::string> finished() override;
+  std::vector<Real> results() override;
   Real progress() override {
     return case_.time.stroke && *case_.time.stroke > 0 ? leading_stroke().value_or(0) / *case_.time.stroke : 0;
   }

@@ -90,7 +90,7 @@ void Flow::check_conditions() {
 }
 
 Outcome Flow::solve_once() {
-  return is_solved_ ? Outcome::done() : solve(0);
+  return is_solved_ && !is_asked_ ? Outcome::done() : solve(0);
 }
 
 Outcome Flow::advance(const Increment& increment) {
@@ -121,7 +121,7 @@ std::vector<GateDrive> Flow::present_drives(Real time) {
 }
 
 bool Flow::is_due(const std::vector<GateDrive>& drives) {
-  if (!is_solved_) return true;
+  if (!is_solved_ || is_asked_) return true;
   for (std::size_t i = 0; i < drives.size(); ++i) {
     const GateDrive& present = state_.gates[i].drive;
     if (drives[i].kind != present.kind || drives[i].value != present.value) return true;
@@ -188,6 +188,7 @@ Outcome Flow::solve(Real time) {
   if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time);
   if (outcome.kind != Outcome::Kind::done) return outcome;
   if (was_solved) note_freezing(old_velocity);
+  is_asked_ = false;
   state_.travelled = 0;
   state_.seconds_since_flow = 0;
   state_.increments_since_flow = 0;

@@ -29,6 +29,9 @@ class Flow final : public Component {
   /// After the mesh and the fields were replaced. Collective.
   void rebuild();
 
+  /// Solves the flow in the next increment, however little has moved.
+  void solve_next() { is_asked_ = true; }
+
   const LinearTotals& linear_totals() const { return totals_; }
   bool pressure_is_free() const { return pressure_is_free_; }
   /// Distance [elements] that freezing the flow between solves misplaced the front, summed over the solves: half of the
@@ -65,6 +68,7 @@ class Flow final : public Component {
   StokesState unknowns_;
   LinearTotals totals_;
   bool is_solved_ = false;
+  bool is_asked_ = false;
   bool pressure_is_free_ = false;
   Real freezing_error_ = 0;
 };

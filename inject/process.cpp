@@ -207,6 +207,33 @@ std::vector<HistoryCell> FillingProcess::history_row() {
   return row;
 }
 
+/// The pressures of gates whose flow is given, else the flows through the others; in their absence the power of the
+/// flow.
+std::vector<Real> FillingProcess::results() {
+  if (!flow_) return {};
+  std::vector<Real> pressures;
+  std::vector<Real> flows;
+  for (const GateState& gate : state_.gates) {
+    if (gate.drive.kind != GateDrive::Kind::pressure) pressures.push_back(gate.pressure);
+    flows.push_back(gate.flow);
+  }
+  if (!pressures.empty()) return pressures;
+  if (!flows.empty()) return flows;
+  const auto rate = scene_.fields["strain_rate"].values();
+  const auto viscosity = scene_.fields["viscosity"].values();
+  Real power = 0;
+  for (std::size_t e = 0; e < rate.size(); ++e) power += 3 * viscosity[e] * rate[e] * rate[e] * scene_.measures[e];
+  return {scene_.comm.sum(power)};
+}
+
+void FillingProcess::solve_all_next() {
+  if (flow_) flow_->solve_next();
+}
+
+bool FillingProcess::solves_again() const {
+  return flow_ && scene_.settings.flow.update.kind != FlowUpdate::Kind::once;
+}
+
 std::string FillingProcess::increment_note() const {
   if (!has_fronts()) return "flow solved";
   return fmt::format("filled {:.4f}{} | {} substeps", filling_->fill_fraction(),

@@ -39,6 +39,9 @@ class FillingProcess final : public Process {
   std::vector<std::string> output_fields() const override;
   Real largest_step() override;
   std::optional<std::string> finished() override;
+  std::vector<Real> results() override;
+  void solve_all_next() override;
+  bool solves_again() const override;
   Real progress() override { return filling_ ? state_.filled / scene_.cavity : 0; }
   std::vector<std::string> history_columns() const override;
   std::vector<HistoryCell> history_row() override;

@@ -20,6 +20,7 @@ struct State {
   Level level = Level::normal;
   std::unique_ptr<std::FILE, CloseFile> file;
   std::vector<std::string> warnings;
+  int silences = 0;
 };
 
 State& state() {
@@ -35,7 +36,7 @@ void put(std::FILE* target, const std::string& line) {
 
 void write(const std::string& line, Level least, std::FILE* terminal) {
   State& log = state();
-  if (!log.speaks) return;
+  if (!log.speaks || log.silences > 0) return;
   if (log.level >= least) put(terminal, line);
   if (log.file != nullptr) put(log.file.get(), line);
 }
@@ -68,10 +69,18 @@ void detail(const std::string& text) {
 }
 
 void warn(const std::string& text) {
+  if (state().silences > 0) return;
   std::vector<std::string>& known = state().warnings;
   if (std::find(known.begin(), known.end(), text) != known.end()) return;
   known.push_back(text);
   write("warning: " + text, Level::quiet, stderr);
+}
+
+Silence::Silence() {
+  ++state().silences;
+}
+Silence::~Silence() {
+  --state().silences;
 }
 
 const std::vector<std::string>& warnings() {

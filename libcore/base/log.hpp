@@ -24,6 +24,15 @@ void detail(const std::string& text);  ///< on the terminal only of a verbose ru
 void warn(const std::string& text);    ///< with "warning: "; also kept for the summary; once per text
 const std::vector<std::string>& warnings();
 
+/// While it lives nothing is said or kept: for trials beside the run, on all ranks alike.
+class Silence {
+ public:
+  Silence();
+  ~Silence();
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+};
+
 template <class... Arguments>
 void info(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
   say(fmt::format(text, std::forward<Arguments>(arguments)...));

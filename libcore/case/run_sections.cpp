@@ -82,6 +82,8 @@ void AccuracySettings::describe(Section& s) {
     choices.emplace_back(level_names[static_cast<std::size_t>(i)], static_cast<Level>(i));
   }
   s.choice("level", level, choices, "preset of every setting that has a default by level; one given by itself wins");
+  s.flag("two_meshes", two_meshes,
+         "solve the first increment and one half-way on coarser meshes too, to estimate the error of space");
 }
 
 void SolverSettings::describe(Section& s) {

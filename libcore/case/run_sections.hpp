@@ -45,6 +45,7 @@ struct TimeSettings {
 /// [accuracy]
 struct AccuracySettings {
   Level level = Level::standard;
+  bool two_meshes = true;
 
   void describe(Section& s);
 };

@@ -39,12 +39,13 @@ std::vector<std::string> engine_columns() {
 
 }  // namespace
 
-Engine::Engine(const Communicator& comm, Process& process, RunSettings settings)
+Engine::Engine(const Communicator& comm, Process& process, RunSettings settings, ProcessFactory on_mesh)
     : comm_(comm),
       process_(process),
       settings_(std::move(settings)),
       results_(comm, settings_.directory, settings_.case_name, settings_.precision),
       checkpoints_(comm, settings_.directory),
+      space_estimate_(comm, std::move(on_mesh)),
       started_at_(wall_clock()) {}
 
 template <class Work>
@@ -141,6 +142,8 @@ bool Engine::try_restart() {
   first_increment_ = last_.number;
   last_checkpoint_ = last_.number;
   last_output_ = state.at("last_output");
+  space_estimate_.restore(state.at("space_estimate"));
+  is_estimated_halfway_ = state.at("is_estimated_halfway");
   process_.restore(std::move(saved->mesh), std::move(saved->fields), saved->state.at("process"));
   results_.resume_after(last_.number);
   if (Probes* probes = process_.probes()) {
@@ -162,6 +165,10 @@ int Engine::solve_once() {
     finish("failed", exit_code::numerics);
     return exit_code::numerics;
   }
+  timed("estimate", [&] {
+    space_estimate_.prepare(process_);
+    space_estimate_.compare(process_, std::nullopt);
+  });
   record(last_);
   finish("done", exit_code::done);
   return exit_code::done;
@@ -212,8 +219,19 @@ Increment Engine::next_increment() {
   return {last_.number + 1, last_.time + dt, dt};
 }
 
+/// Whether the coming increment will be repeated on coarser meshes: the first, and the first one past the middle.
+bool Engine::begin_estimate() {
+  const bool is_halfway = !is_estimated_halfway_ && process_.solves_again() && progress() >= 0.5;
+  if (last_.number > 0 && !is_halfway) return false;
+  is_estimated_halfway_ = is_halfway;
+  if (is_halfway) process_.solve_all_next();
+  timed("estimate", [&] { space_estimate_.prepare(process_); });
+  return true;
+}
+
 /// One increment, tried with smaller steps where components ask for it. The reason of a final failure.
 std::optional<std::string> Engine::make_increment() {
+  const bool is_compared = begin_estimate();
   Increment increment = next_increment();
   for (int cut = 0;; ++cut) {
     const Outcome outcome = try_increment(increment);
@@ -221,6 +239,7 @@ std::optional<std::string> Engine::make_increment() {
       next_dt_limit_ = cut > 0 || std::isfinite(next_dt_limit_) ? increment.dt * growth_after_cut
                                                                 : std::numeric_limits<Real>::infinity();
       last_ = increment;
+      if (is_compared) timed("estimate", [&] { space_estimate_.compare(process_, increment); });
       record(increment);
       return std::nullopt;
     }
@@ -271,11 +290,16 @@ void Engine::record(const Increment& increment) {
   if (increment.number % settings_.output_every == 0) write_fields(increment.number);
 }
 
-void Engine::print_increment(const Increment& increment) {
-  const Real done = std::isfinite(settings_.end) ? increment.time / settings_.end : 0;
+/// Share of the run that is done, 0..1, as far as it can be told.
+Real Engine::progress() const {
+  const Real done = std::isfinite(settings_.end) ? last_.time / settings_.end : 0;
   const Real by_count =
-      settings_.increments ? Real(increment.number) / Real(std::max<GlobalId>(*settings_.increments, 1)) : 0;
-  const Real share = std::clamp(std::max({done, by_count, process_.progress()}), 0.0, 1.0);
+      settings_.increments ? Real(last_.number) / Real(std::max<GlobalId>(*settings_.increments, 1)) : 0;
+  return std::clamp(std::max({done, by_count, process_.progress()}), 0.0, 1.0);
+}
+
+void Engine::print_increment(const Increment& increment) {
+  const Real share = progress();
   const std::string eta = share > 0 ? report::duration(wall_s() * (1 - share) / share) : "-";
   log::info("{:6} | t {:.5g} s | dt {:.3g} s | {} | {:.1f} s | {:.0f} % | left {}", increment.number, increment.time,
             increment.dt, process_.increment_note(), wall_s(), 100 * share, eta);
@@ -313,7 +337,9 @@ void Engine::write_checkpoint() {
                        {"dt", last_.dt},
                        {"dt_limit", std::isfinite(next_dt_limit_) ? nlohmann::json(next_dt_limit_) : nlohmann::json()},
                        {"wall_s", wall_s()},
-                       {"last_output", last_output_}};
+                       {"last_output", last_output_},
+                       {"space_estimate", space_estimate_.save()},
+                       {"is_estimated_halfway", is_estimated_halfway_}};
     if (const Probes* probes = process_.probes()) state["engine"]["probes"] = probes->places();
     state["process"] = process_.save_state();
     checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state);
@@ -337,12 +363,21 @@ std::string Engine::reason_to_stop() {
   return "";
 }
 
+ErrorBudget Engine::error_budget() {
+  ErrorBudget budget = process_.error_budget();
+  const std::vector<Component*> components = process_.components();
+  const bool remeshes = std::any_of(components.begin(), components.end(),
+                                    [](const Component* component) { return component->name() == "remeshing"; });
+  if (const auto share = space_estimate_.share(remeshes)) budget.add(*share);
+  return budget;
+}
+
 void Engine::finish(const std::string& status, int code) {
   for (const std::string& option : unused_petsc_options()) {
     log::warning("command line: nothing asked for the PETSc option {}", option);
   }
   if (last_output_ != last_.number || code == exit_code::numerics) write_fields(last_.number);
-  const ErrorBudget budget = process_.error_budget();
+  const ErrorBudget budget = error_budget();
   write_summary(status, code, budget);
   print_timings();
   for (const std::string& line : process_.closing_lines()) log::info("{}", line);

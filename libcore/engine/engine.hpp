@@ -10,6 +10,7 @@
 
 #include "engine/history.hpp"
 #include "engine/process.hpp"
+#include "engine/space_estimate.hpp"
 #include "engine/stop_request.hpp"
 #include "parallel/communicator.hpp"
 #include "storage/checkpoint.hpp"
@@ -42,7 +43,8 @@ struct RunSettings {
 /// Runs a process. Before the first increment it refuses (Defect) a component that reads a field which nothing gives.
 class Engine {
  public:
-  Engine(const Communicator& comm, Process& process, RunSettings settings);
+  /// on_mesh: the scene anew on another mesh, for the estimate of the error of space; without it none is made.
+  Engine(const Communicator& comm, Process& process, RunSettings settings, ProcessFactory on_mesh = {});
 
   /// The whole run. Returns the exit code: done, numerics or checkpointed. A storage failure is thrown. Collective.
   int run();
@@ -65,6 +67,9 @@ class Engine {
   Increment next_increment();
   Outcome try_increment(const Increment& increment);
   std::optional<std::string> make_increment();
+  bool begin_estimate();
+  Real progress() const;
+  ErrorBudget error_budget();
   void record(const Increment& increment);
   void print_increment(const Increment& increment);
   void write_fields(GlobalId increment);
@@ -85,6 +90,8 @@ class Engine {
   StopRequest stop_;
   ResultWriter results_;
   CheckpointStore checkpoints_;
+  SpaceEstimate space_estimate_;
+  bool is_estimated_halfway_ = false;
   std::optional<History> history_;
   std::vector<Timing> timings_;
   Increment last_;                                              ///< the last increment done

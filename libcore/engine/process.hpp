@@ -78,6 +78,13 @@ class Process {
   virtual LinearTotals linear_totals() const = 0;
   virtual nlohmann::json accuracy() = 0;                           ///< object `accuracy` of summary.json
   virtual std::vector<std::string> closing_lines() { return {}; }  ///< before the error budget at the end of the log
+  /// The main results of the last increment, by whose change with the mesh the error of space is judged: all of one
+  /// unit, in a fixed order; empty where a scene has none. The same on all ranks. Collective.
+  virtual std::vector<Real> results() { return {}; }
+  /// Before an increment whose results() will be compared: all of it is solved anew, nothing kept from earlier ones.
+  virtual void solve_all_next() {}
+  /// Whether results() change in the course of the run beyond what the first increment tells of the mesh.
+  virtual bool solves_again() const { return true; }
   /// Sources of error that the process can tell at the end of a run, each once; the engine adds that of space.
   virtual ErrorBudget error_budget() { return {}; }
 

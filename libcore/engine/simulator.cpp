@@ -144,7 +144,11 @@ int run_scene(const Communicator& comm, Simulator& simulator, Mesh mesh, RunSett
   check_probe_fields(*process, common, reader);
   reader.check_mesh(names);
   settings.resolved_case = reader.resolved(settings.directory);
-  return Engine(comm, *process, std::move(settings)).run();
+  ProcessFactory on_mesh;
+  if (common.accuracy.two_meshes) {
+    on_mesh = [&](Mesh other) { return simulator.assemble(comm, std::move(other), reader); };
+  }
+  return Engine(comm, *process, std::move(settings), std::move(on_mesh)).run();
 }
 
 int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
