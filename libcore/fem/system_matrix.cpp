@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/error.hpp"
+#include "base/short_row.hpp"
 #include "parallel/sparse_exchange.hpp"
 
 namespace malleus {
@@ -198,17 +199,18 @@ Real* SystemMatrix::find(LocalId row, LocalId column) {
   const auto entries = static_cast<std::size_t>(block_size_) * static_cast<std::size_t>(block_size_);
   if (row >= owned_) {
     const auto i = static_cast<std::size_t>(row - owned_);
-    const auto begin = guests_.columns.begin() + static_cast<std::ptrdiff_t>(guests_.offsets[i]);
-    const auto end = guests_.columns.begin() + static_cast<std::ptrdiff_t>(guests_.offsets[i + 1]);
-    const auto place = std::lower_bound(begin, end, column);
+    const LocalId* begin = guests_.columns.data() + guests_.offsets[i];
+    const LocalId* end = guests_.columns.data() + guests_.offsets[i + 1];
+    const LocalId* place = begin + place_in_row(begin, end - begin, column);
     check(place != end && *place == column, "a block is in the pattern");
-    return guests_.values.data() + static_cast<std::size_t>(place - guests_.columns.begin()) * entries;
+    return guests_.values.data() + static_cast<std::size_t>(place - guests_.columns.data()) * entries;
   }
   const bool inside = column < owned_;
   const Part& part = inside ? inside_ : outside_;
   const PetscInt wanted = inside ? column : outside_columns_[static_cast<std::size_t>(column - owned_)];
+  const PetscInt* begin = part.columns + part.offsets[row];
   const PetscInt* end = part.columns + part.offsets[row + 1];
-  const PetscInt* place = std::lower_bound(part.columns + part.offsets[row], end, wanted);
+  const PetscInt* place = begin + place_in_row(begin, end - begin, wanted);
   check(place != end && *place == wanted, "a block is in the pattern");
   return part.values + static_cast<std::size_t>(place - part.columns) * entries;
 }

@@ -66,9 +66,10 @@ void attach_rigid_modes(const Communicator& comm, const MultigridLevel& level, c
 
 class GamgVelocity final : public VelocityMultigrid {
  public:
-  GamgVelocity(const Communicator& comm, const MultigridLevel& level, const NodeConstraints& constraints)
+  GamgVelocity(const Communicator& comm, const MultigridLevel& level, const NodeConstraints& constraints,
+               bool rigid_modes)
       : matrix_(make_matrix(comm, level)) {
-    attach_rigid_modes(comm, level, constraints, matrix_.get());
+    if (rigid_modes) attach_rigid_modes(comm, level, constraints, matrix_.get());
     petsc_call(MatCreateVecs(matrix_.get(), in_.out(), out_.out()));
     petsc_call(PCCreate(comm.raw(), cycle_.out()));
     petsc_call(PCSetOptionsPrefix(cycle_.get(), "velocity_"));
@@ -79,10 +80,14 @@ class GamgVelocity final : public VelocityMultigrid {
     petsc_call(PCSetFromOptions(cycle_.get()));
     const TrapsOff traps_off;
     petsc_call(PCSetUp(cycle_.get()));
-    PetscInt count = 0;
-    petsc_call(PCMGGetLevels(cycle_.get(), &count));
+    PetscBool is_gamg = PETSC_FALSE;
+    petsc_call(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(cycle_.get()), PCGAMG, &is_gamg));
+    PetscInt count = 1;
     PetscReal grid = 1;
-    petsc_call(PCMGGetGridComplexity(cycle_.get(), &grid, &complexity_));
+    if (is_gamg == PETSC_TRUE) {
+      petsc_call(PCMGGetLevels(cycle_.get(), &count));
+      petsc_call(PCMGGetGridComplexity(cycle_.get(), &grid, &complexity_));
+    }
     summary_.resize(static_cast<std::size_t>(count));
     if (!summary_.empty()) summary_.front() = {level.layout.ownership.total(), level.values.rows, 0, comm.size()};
   }
@@ -110,8 +115,8 @@ class GamgVelocity final : public VelocityMultigrid {
 }  // namespace
 
 std::unique_ptr<VelocityMultigrid> make_gamg_velocity(const Communicator& comm, const MultigridLevel& level,
-                                                      const NodeConstraints& constraints) {
-  return std::make_unique<GamgVelocity>(comm, level, constraints);
+                                                      const NodeConstraints& constraints, bool rigid_modes) {
+  return std::make_unique<GamgVelocity>(comm, level, constraints, rigid_modes);
 }
 
 }  // namespace malleus

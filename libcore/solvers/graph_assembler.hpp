@@ -2,10 +2,10 @@
 
 /// Sums element contributions into the scalar rows of a block graph.
 
-#include <algorithm>
 #include <map>
 
 #include "base/error.hpp"
+#include "base/short_row.hpp"
 #include "fem/linear_system.hpp"
 #include "parallel/sparse_exchange.hpp"
 #include "solvers/multigrid/block_rows.hpp"
@@ -51,11 +51,11 @@ class GraphAssembler {
 
  private:
   void add_here(LocalId row, LocalId column, Real value) {
-    const auto begin = graph_.columns.begin() + graph_.offsets[static_cast<std::size_t>(row)];
-    const auto end = graph_.columns.begin() + graph_.offsets[static_cast<std::size_t>(row) + 1];
-    const auto place = std::lower_bound(begin, end, column);
+    const LocalId* begin = graph_.columns.data() + graph_.offsets[static_cast<std::size_t>(row)];
+    const LocalId* end = graph_.columns.data() + graph_.offsets[static_cast<std::size_t>(row) + 1];
+    const LocalId* place = begin + place_in_row(begin, end - begin, column);
     check(place != end && *place == column, "the nodes of an element are coupled in the matrix");
-    values_[static_cast<std::size_t>(place - graph_.columns.begin())] += static_cast<T>(value);
+    values_[static_cast<std::size_t>(place - graph_.columns.data())] += static_cast<T>(value);
   }
 
   const LinearSystem& system_;

@@ -43,6 +43,9 @@ std::vector<Step> make_chain(const LinearSolverOptions& options, const LinearSys
   rigid_double.precision = CyclePrecision::double_precision;
   PreconditionerSettings gamg = first;
   gamg.velocity = VelocityMethod::gamg;
+  const bool asks_for_translations = options.preconditioner.modes == CoarseModes::translations;
+  gamg.modes =
+      asks_for_translations && options.method == LinearMethod::gamg ? CoarseModes::translations : CoarseModes::rigid;
   std::vector<Step> wished = {
       {options.method, options.method == LinearMethod::gamg ? gamg : first, "the method chosen"}};
   if (options.fall_back && options.method == LinearMethod::block_triangular) {

@@ -17,6 +17,10 @@ namespace {
 constexpr Real rigid_contrast = 30;
 constexpr Real double_contrast = 1e6;
 
+const char* name_of(CoarseModes modes) {
+  return modes == CoarseModes::rigid ? "rigid-body modes" : "translations";
+}
+
 /// The finest level of the velocity block; takes the values and copies layout and graph.
 MultigridLevel finest_level(const LinearSystem& system, StokesBlocks& blocks) {
   MultigridLevel level;
@@ -60,7 +64,7 @@ StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const Pre
   velocity_correction_ = velocity_residual_;
   MultigridLevel finest = finest_level(system, blocks_);
   if (settings_.velocity == VelocityMethod::gamg) {
-    velocity_ = make_gamg_velocity(*system.comm, finest, *system.constraints);
+    velocity_ = make_gamg_velocity(*system.comm, finest, *system.constraints, settings_.modes == CoarseModes::rigid);
   } else {
     MultigridSettings multigrid;
     multigrid.rigid_modes = settings_.modes == CoarseModes::rigid;
@@ -146,12 +150,9 @@ void StokesPreconditioner::apply(const Real* residual, Real* correction) {
   const Eigen::VectorXd q = solve_pressures(residual);
   for (std::size_t node = 0; node < rows; ++node) {
     correction[node * (dim + 1) + dim] = blocks_.scaling * static_cast<Real>(pressure_correction_[node]);
-    for (LocalId k = settings_.positive ? 0 : blocks_.graph.offsets[node];
-         !settings_.positive && k < blocks_.graph.offsets[node + 1]; ++k) {
-      const float p = pressure_correction_[index(blocks_.graph.columns[index(k)])];
-      const float* gradient = blocks_.gradient.at(k);
-      for (std::size_t d = 0; d < dim; ++d) velocity_residual_[node * dim + d] -= static_cast<Real>(gradient[d] * p);
-    }
+  }
+  if (!settings_.positive) {
+    with_block(static_cast<int>(dim), [&](auto block) { subtract_gradient<block>(); });
   }
   if (q.size() > 0) {
     if (operator_->system().comm->is_root()) std::copy(q.begin(), q.end(), correction + operator_->node_unknowns());
@@ -160,6 +161,18 @@ void StokesPreconditioner::apply(const Real* residual, Real* correction) {
     }
   }
   solve_velocity(velocity_residual_, correction);
+}
+
+template <int D>
+void StokesPreconditioner::subtract_gradient() {
+  for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
+    std::array<float, D> sum{};
+    for (LocalId k = blocks_.graph.offsets[node]; k < blocks_.graph.offsets[node + 1]; ++k) {
+      const float p = pressure_correction_[index(blocks_.graph.columns[index(k)])];
+      for (std::size_t d = 0; d < D; ++d) sum[d] += blocks_.gradient.values[index(k) * D + d] * p;
+    }
+    for (std::size_t d = 0; d < D; ++d) velocity_residual_[node * D + d] -= static_cast<Real>(sum[d]);
+  }
 }
 
 /// Fills the pressure's correction, copies included, in the blocks' scaling; returns the borders'.
@@ -186,11 +199,10 @@ Eigen::VectorXd StokesPreconditioner::solve_pressures(const Real* residual) {
 
 std::string StokesPreconditioner::summary() const {
   if (settings_.velocity == VelocityMethod::gamg) {
-    return fmt::format("GAMG with rigid-body modes, {} levels, complexity {:.2f}", velocity_->levels().size(),
-                       velocity_->operator_complexity());
+    return fmt::format("GAMG with {}, {} levels, complexity {:.2f}", name_of(settings_.modes),
+                       velocity_->levels().size(), velocity_->operator_complexity());
   }
-  return fmt::format("multigrid with {} in {} precision, {} levels, complexity {:.2f}",
-                     settings_.modes == CoarseModes::rigid ? "rigid-body modes" : "translations",
+  return fmt::format("multigrid with {} in {} precision, {} levels, complexity {:.2f}", name_of(settings_.modes),
                      settings_.precision == CyclePrecision::double_precision ? "double" : "single",
                      velocity_->levels().size(), velocity_->operator_complexity());
 }

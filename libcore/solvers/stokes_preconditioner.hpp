@@ -41,6 +41,8 @@ class StokesPreconditioner {
   void add_pockets(const Real* residual);
   void make_border_block();
   Eigen::VectorXd solve_pressures(const Real* residual);
+  template <int D>
+  void subtract_gradient();  ///< B^T of the pressure's correction, from the velocity's residual
   void solve_velocity(std::vector<Real>& right_side, Real* correction);
 
   PreconditionerSettings settings_;

@@ -21,6 +21,54 @@ Real lid_speed(const Real* x, int dim) {
   return dim == 3 ? 16 * x[0] * (1 - x[0]) * x[1] * (1 - x[1]) : 4 * x[0] * (1 - x[0]);
 }
 
+/// Nodes held along a direction each by a stiffness: contacts with a tool that have closed.
+class HeldNodes final : public ResidualTerm {
+ public:
+  HeldNodes(const Mesh& mesh, std::vector<LocalId> nodes, Real stiffness)
+      : mesh_(mesh), nodes_(std::move(nodes)), stiffness_(stiffness) {}
+
+  void add_residual(const NodeSpace&, std::span<const Real> unknowns, std::span<Real> force) const override {
+    const int dim = mesh_.dim;
+    for (const LocalId node : nodes_) {
+      const Real* velocity = unknowns.data() + static_cast<std::size_t>(node) * static_cast<std::size_t>(dim + 1);
+      const std::array<Real, 3> normal = normal_at(node);
+      Real speed = 0;
+      for (int d = 0; d < dim; ++d) speed += velocity[d] * normal[static_cast<std::size_t>(d)];
+      for (int d = 0; d < dim; ++d) {
+        force[static_cast<std::size_t>(node * dim + d)] += stiffness_ * speed * normal[static_cast<std::size_t>(d)];
+      }
+    }
+  }
+
+  void add_tangent(const NodeSpace&, std::span<const Real>, TangentSink& sink) const override {
+    const auto dim = static_cast<std::size_t>(mesh_.dim);
+    for (const LocalId node : nodes_) {
+      const std::array<Real, 3> normal = normal_at(node);
+      std::array<Real, 9> block{};
+      for (std::size_t i = 0; i < dim; ++i) {
+        for (std::size_t j = 0; j < dim; ++j) block[i * dim + j] = stiffness_ * normal[i] * normal[j];
+      }
+      sink.add(node, node, block.data());
+    }
+  }
+
+  bool is_linear() const override { return true; }
+
+ private:
+  /// Tilted from x by up to a fifth, differently at each node.
+  std::array<Real, 3> normal_at(LocalId node) const {
+    const Real* x = mesh_.point(node);
+    std::array<Real, 3> normal = {1, 0.2 * std::sin(91 * x[1]), mesh_.dim == 3 ? 0.2 * std::cos(77 * x[2]) : 0};
+    const Real length = std::hypot(normal[0], normal[1], normal[2]);
+    for (Real& value : normal) value /= length;
+    return normal;
+  }
+
+  const Mesh& mesh_;
+  std::vector<LocalId> nodes_;
+  Real stiffness_;
+};
+
 NodeConstraints wall_constraints(const Mesh& mesh, bool is_open) {
   NodeConstraints constraints(mesh.dim, mesh.nodes());
   for (LocalId node = 0; node < mesh.nodes(); ++node) {
@@ -92,14 +140,31 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   model_ = std::make_unique<GivenViscosity>(std::move(viscosity));
   equations_ = std::make_unique<StokesOperator>(comm, mesh_, Geometry::plane);
   equations_->set_viscosity(*model_);
+  if (options.penalty > 0) add_penalties(options.penalty, options.viscosity_scale);
   equations_->set_constraints(options.is_floating ? NodeConstraints(dim, mesh_.nodes())
                                                   : wall_constraints(mesh_, options.is_open));
   equations_->set_loads(std::move(loads));
+  for (LocalId node = 0; node < mesh_.nodes(); ++node) {
+    mesh_.coordinates[static_cast<std::size_t>((node + 1) * dim - 1)] /= options.aspect;
+  }
   equations_->prepare();
   StokesState state = equations_->start_state();
   equations_->update_viscosity(state);
   right_side_ = right_side_of(*equations_, state);
   system_ = &equations_->tangent(state, Tangent::picard);
+}
+
+void StokesCavity::add_penalties(Real penalty, Real viscosity) {
+  std::vector<LocalId> held;
+  for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) {
+    const Real* x = mesh_.point(node);
+    const bool is_on_patch =
+        x[0] > 1 - on_wall && x[1] > 0.2 && x[1] < 0.8 && (mesh_.dim == 2 || std::abs(x[2] - 0.5) < 0.3);
+    if (is_on_patch) held.push_back(node);
+  }
+  const Real edge = std::pow(static_cast<Real>(mesh_.total_nodes()), -1.0 / mesh_.dim);
+  contacts_ = std::make_unique<HeldNodes>(mesh_, std::move(held), penalty * viscosity * std::pow(edge, mesh_.dim - 2));
+  equations_->set_terms({contacts_.get()});
 }
 
 }  // namespace malleus::test

@@ -24,6 +24,9 @@ struct CavityOptions {
   std::vector<Sphere> spheres;  ///< discs in 2D
   bool is_floating = false;     ///< nothing is fixed anywhere
   bool is_open = false;  ///< sides without traction, bottom fixed, top moving down at 1: an upsetting that sticks
+  Real aspect = 1;       ///< the last coordinate is divided by this
+  /// Dimensionless penalty r h / eta of contacts on the nodes of a patch of the side x = 1; with is_open.
+  Real penalty = 0;
 };
 
 /// `count` spheres of radius 0.05 to 0.13 in the unit box, always the same; apart from each other where `disjoint`.
@@ -43,7 +46,10 @@ class StokesCavity {
   const LinearVector& right_side() const { return right_side_; }
 
  private:
+  void add_penalties(Real penalty, Real viscosity);
+
   Mesh mesh_;
+  std::unique_ptr<ResidualTerm> contacts_;
   std::unique_ptr<GivenViscosity> model_;
   std::unique_ptr<StokesOperator> equations_;
   const LinearSystem* system_ = nullptr;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 
 #include "base/index.hpp"
 
@@ -21,30 +22,55 @@ struct Column {
     for (int i = 0; i < B; ++i) result[i] = values[i];
     return result;
   }
-  /// sum += sign * block * x
-  static void add_product(Register& sum, const T* block, const T* x) {
-    for (int c = 0; c < B; ++c) sum += load(block + c * B) * x[c];
-  }
-  static void subtract_product(Register& sum, const T* block, const T* x) {
-    for (int c = 0; c < B; ++c) sum -= load(block + c * B) * x[c];
-  }
   static void store(const Register& sum, T* values) {
     for (int i = 0; i < B; ++i) values[i] = sum[i];
   }
 };
 
+/// A sum of products of blocks with vectors, in independent parts: one would wait for each addition to end.
+template <class T, int B>
+struct Sum {
+  using K = Column<T, B>;
+  static constexpr int parts = B < 3 ? B : 3;
+  std::array<typename K::Register, parts> part;
+
+  explicit Sum(const typename K::Register& first) {
+    part[0] = first;
+    for (std::size_t i = 1; i < parts; ++i) part[i].setZero();
+  }
+  void add(const T* block, const T* x) {
+    for (int c = 0; c < B; ++c) part[static_cast<std::size_t>(c % parts)] += K::load(block + c * B) * x[c];
+  }
+  void subtract(const T* block, const T* x) {
+    for (int c = 0; c < B; ++c) part[static_cast<std::size_t>(c % parts)] -= K::load(block + c * B) * x[c];
+  }
+  typename K::Register total() const {
+    typename K::Register result = part[0];
+    for (std::size_t i = 1; i < parts; ++i) result += part[i];
+    return result;
+  }
+};
+
+/// x_row = x_row (or 0) + D^-1 rest.
+template <int B, class T>
+void correct(const SweepMatrix<T>& matrix, LocalId row, const typename Column<T, B>::Register& rest, bool from_zero,
+             T* x) {
+  using K = Column<T, B>;
+  T* place = x + index(row) * B;
+  Sum<T, B> solution(from_zero ? K::Register::Zero() : K::load_vector(place));
+  solution.add(matrix.inverses + index(row) * B * B, rest.data());
+  K::store(solution.total(), place);
+}
+
 template <int B, class T>
 void forward_from_zero(const SweepMatrix<T>& matrix, const T* b, T* x) {
-  using K = Column<T, B>;
   const BlockGraph& graph = *matrix.graph;
   for (LocalId row = 0; row < graph.rows(); ++row) {
-    typename K::Register sum = K::load_vector(b + index(row) * B);
+    Sum<T, B> rest(Column<T, B>::load_vector(b + index(row) * B));
     for (LocalId k = graph.offsets[index(row)]; k < graph.diagonals[index(row)]; ++k) {
-      K::subtract_product(sum, matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+      rest.subtract(matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
     }
-    typename K::Register solution = K::Register::Zero();
-    K::add_product(solution, matrix.inverses + index(row) * B * B, sum.data());
-    K::store(solution, x + index(row) * B);
+    correct<B>(matrix, row, rest.total(), true, x);
   }
 }
 
@@ -53,26 +79,38 @@ void upper_residual(const SweepMatrix<T>& matrix, const T* x, T* residual) {
   using K = Column<T, B>;
   const BlockGraph& graph = *matrix.graph;
   for (LocalId row = 0; row < graph.rows(); ++row) {
-    typename K::Register sum = K::Register::Zero();
+    Sum<T, B> sum(K::Register::Zero());
     for (LocalId k = graph.diagonals[index(row)] + 1; k < graph.offsets[index(row) + 1]; ++k) {
-      K::subtract_product(sum, matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+      sum.subtract(matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
     }
-    K::store(sum, residual + index(row) * B);
+    K::store(sum.total(), residual + index(row) * B);
   }
 }
 
-/// x_row += D^-1 (b - A x)_row.
+/// x_row += D^-1 (b - A x)_row, for all rows in increasing order.
 template <int B, class T>
-void relax(const SweepMatrix<T>& matrix, LocalId row, const T* b, T* x) {
-  using K = Column<T, B>;
+void relax_forward(const SweepMatrix<T>& matrix, const T* b, T* x) {
   const BlockGraph& graph = *matrix.graph;
-  typename K::Register sum = K::load_vector(b + index(row) * B);
-  for (LocalId k = graph.offsets[index(row)]; k < graph.offsets[index(row) + 1]; ++k) {
-    K::subtract_product(sum, matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+  for (LocalId row = 0; row < graph.rows(); ++row) {
+    Sum<T, B> rest(Column<T, B>::load_vector(b + index(row) * B));
+    for (LocalId k = graph.offsets[index(row)]; k < graph.offsets[index(row) + 1]; ++k) {
+      rest.subtract(matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+    }
+    correct<B>(matrix, row, rest.total(), false, x);
   }
-  typename K::Register solution = K::load_vector(x + index(row) * B);
-  K::add_product(solution, matrix.inverses + index(row) * B * B, sum.data());
-  K::store(solution, x + index(row) * B);
+}
+
+/// The same in decreasing order, the entries of a row too: memory is then read as one descending stream.
+template <int B, class T>
+void relax_backward(const SweepMatrix<T>& matrix, const T* b, T* x) {
+  const BlockGraph& graph = *matrix.graph;
+  for (LocalId row = graph.rows() - 1; row >= 0; --row) {
+    Sum<T, B> rest(Column<T, B>::load_vector(b + index(row) * B));
+    for (LocalId k = graph.offsets[index(row) + 1] - 1; k >= graph.offsets[index(row)]; --k) {
+      rest.subtract(matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+    }
+    correct<B>(matrix, row, rest.total(), false, x);
+  }
 }
 
 template <int B, int C, class T>
@@ -119,16 +157,12 @@ void residual_after_forward(const SweepMatrix<T>& matrix, const T* x, T* residua
 
 template <class T>
 void sweep_backward(const SweepMatrix<T>& matrix, const T* b, T* x) {
-  with_block(matrix.values->rows, [&](auto block) {
-    for (LocalId row = matrix.graph->rows() - 1; row >= 0; --row) relax<block>(matrix, row, b, x);
-  });
+  with_block(matrix.values->rows, [&](auto block) { relax_backward<block>(matrix, b, x); });
 }
 
 template <class T>
 void sweep_forward(const SweepMatrix<T>& matrix, const T* b, T* x) {
-  with_block(matrix.values->rows, [&](auto block) {
-    for (LocalId row = 0; row < matrix.graph->rows(); ++row) relax<block>(matrix, row, b, x);
-  });
+  with_block(matrix.values->rows, [&](auto block) { relax_forward<block>(matrix, b, x); });
 }
 
 template <class T>

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "base/index.hpp"
+#include "base/short_row.hpp"
 #include "parallel/sparse_exchange.hpp"
 
 namespace malleus {
@@ -80,15 +81,9 @@ GatheredRows gather_rows(const Communicator& comm, const BlockLayout& nodes, con
 /// P^T A P of this rank's fine rows. Coarse nodes carry workspace numbers: places in `numbers`.
 class LocalProduct {
  public:
-  LocalProduct(const MultigridLevel& fine, const GatheredRows& p, LocalId fine_rows) : fine_(fine), p_(p) {
-    numbers_ = p.columns;
-    std::sort(numbers_.begin(), numbers_.end());
-    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
-    columns_.reserve(p.columns.size());
-    for (const GlobalId number : p.columns) {
-      columns_.push_back(
-          static_cast<LocalId>(std::lower_bound(numbers_.begin(), numbers_.end(), number) - numbers_.begin()));
-    }
+  LocalProduct(const MultigridLevel& fine, const GatheredRows& p, LocalId fine_rows, const Ownership& coarse)
+      : fine_(fine), p_(p) {
+    number_columns(coarse);
     marks_.assign(numbers_.size(), -1);
     find_patterns(fine_rows);
   }
@@ -112,19 +107,43 @@ class LocalProduct {
   const std::vector<GlobalId>& numbers() const { return numbers_; }
   const BlockGraph& graph() const { return graph_; }  ///< rows and columns: workspace numbers
   const BlockValues<Real>& values() const { return values_; }
+  /// Where all coarse nodes are this rank's, workspace numbers are theirs: the product is the coarse operator.
+  void give_to(MultigridLevel& coarse) {
+    coarse.graph = std::move(graph_);
+    coarse.values = std::move(values_);
+  }
 
  private:
+  /// The workspace: all coarse nodes that this rank owns, and those of others that the rows refer to.
+  void number_columns(const Ownership& coarse) {
+    std::vector<GlobalId> foreign;
+    std::copy_if(p_.columns.begin(), p_.columns.end(), std::back_inserter(foreign),
+                 [&](GlobalId number) { return !coarse.owns(number); });
+    std::sort(foreign.begin(), foreign.end());
+    foreign.erase(std::unique(foreign.begin(), foreign.end()), foreign.end());
+    const auto after = std::lower_bound(foreign.begin(), foreign.end(), coarse.begin());
+    const GlobalId before = after - foreign.begin();
+    numbers_.assign(foreign.begin(), after);
+    for (GlobalId number = coarse.begin(); number < coarse.end(); ++number) numbers_.push_back(number);
+    numbers_.insert(numbers_.end(), after, foreign.end());
+    columns_.reserve(p_.columns.size());
+    for (const GlobalId number : p_.columns) {
+      const bool is_own = coarse.owns(number);
+      const auto place = is_own ? before + number - coarse.begin()
+                                : std::lower_bound(numbers_.begin(), numbers_.end(), number) - numbers_.begin();
+      columns_.push_back(static_cast<LocalId>(place));
+    }
+  }
+
   /// Columns of the rows of A P, then rows of P^T A P as the union of those of the fine rows that refer to them.
   void find_patterns(LocalId fine_rows) {
     std::vector<std::vector<LocalId>> rows_of(numbers_.size());
     for (LocalId row = 0; row < fine_rows; ++row) {
-      const auto start = static_cast<std::ptrdiff_t>(product_columns_.size());
       const bool is_used = p_.offsets[index(row)] < p_.offsets[index(row) + 1];
       for (LocalId k = fine_.graph.offsets[index(row)]; is_used && k < fine_.graph.offsets[index(row) + 1]; ++k) {
         const LocalId j = fine_.graph.columns[index(k)];
         for (LocalId l = p_.offsets[index(j)]; l < p_.offsets[index(j) + 1]; ++l) add_once(columns_[index(l)], row);
       }
-      std::sort(product_columns_.begin() + start, product_columns_.end());
       product_offsets_.push_back(static_cast<LocalId>(product_columns_.size()));
       for (LocalId l = p_.offsets[index(row)]; l < p_.offsets[index(row) + 1]; ++l) {
         rows_of[index(columns_[index(l)])].push_back(row);
@@ -171,12 +190,12 @@ class LocalProduct {
   void scatter(LocalId entry, LocalId begin, LocalId end, const Real* product) {
     const auto coarse = index(columns_[index(entry)]);
     const ConstBlockView<B, C> p(p_.blocks.data() + index(entry) * B * C);
-    const auto first = graph_.columns.begin() + graph_.offsets[coarse];
-    const auto last = graph_.columns.begin() + graph_.offsets[coarse + 1];
-    auto place = first;
+    const LocalId first = graph_.offsets[coarse];
+    const LocalId* row = graph_.columns.data() + first;
+    const std::ptrdiff_t count = graph_.offsets[coarse + 1] - first;
     for (LocalId k = begin; k < end; ++k) {
-      place = std::lower_bound(place, last, product_columns_[index(k)]);
-      Real* target = values_.at(static_cast<LocalId>(place - graph_.columns.begin()));
+      const std::ptrdiff_t place = place_in_row(row, count, product_columns_[index(k)]);
+      Real* target = values_.at(first + static_cast<LocalId>(place));
       BlockView<C, C>(target).noalias() += p.transpose() * ConstBlockView<B, C>(product + index(k - begin) * B * C);
     }
   }
@@ -187,7 +206,7 @@ class LocalProduct {
   std::vector<LocalId> columns_;   ///< columns of p_ in workspace numbers
   std::vector<LocalId> marks_;     ///< [workspace]
   std::vector<LocalId> product_offsets_ = {0};
-  std::vector<LocalId> product_columns_;  ///< of A P
+  std::vector<LocalId> product_columns_;  ///< of A P, in the order in which they are met
   BlockGraph graph_;
   BlockValues<Real> values_;
 };
@@ -290,10 +309,16 @@ class RowMerger {
 void make_coarse_operator(const Communicator& comm, const MultigridLevel& fine, const Prolongator& prolongator,
                           MultigridLevel& coarse) {
   const GatheredRows p = gather_rows(comm, fine.layout, prolongator);
-  LocalProduct product(fine, p, fine.graph.rows());
+  const Ownership& ownership = prolongator.layout.ownership;
+  LocalProduct product(fine, p, fine.graph.rows(), ownership);
   const int modes = prolongator.values.columns;
   with_blocks(fine.values.rows, modes, [&](auto rows, auto columns) { product.compute<rows, columns>(); });
-  const Ownership& ownership = prolongator.layout.ownership;
+  if (comm.size() == 1) {
+    coarse.layout = BlockLayout(comm, ownership, {});
+    product.give_to(coarse);
+    coarse.graph.find_diagonals();
+    return;
+  }
   const std::map<int, Contributions> received = exchange_rows(comm, product, ownership);
   RowMerger merger(comm, ownership, product.values().size());
   for (LocalId row = 0; row < product.graph().rows(); ++row) {
