@@ -14,6 +14,7 @@ class ForgeSimulator final : public Simulator {
     return "Hot forging: viscoplastic bodies under contact and friction with tools and with each other.";
   }
   CommonSections& common() override { return case_.common; }
+  void forget() override { case_ = {}; }
   const TimeSettings& time() const override { return case_.time; }
   void describe(CaseReader& reader) override {
     case_.describe(reader);

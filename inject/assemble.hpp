@@ -13,6 +13,7 @@ class InjectSimulator final : public Simulator {
   std::string program() const override { return "inject"; }
   std::string description() const override { return "fills cavities with viscous fluids"; }
   CommonSections& common() override { return case_.common; }
+  void forget() override { case_ = {}; }
   const TimeSettings& time() const override { return case_.time; }
   void describe(CaseReader& reader) override;
   std::unique_ptr<Process> assemble(const Communicator& comm, Mesh mesh, CaseReader& reader) override;

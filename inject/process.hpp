@@ -42,6 +42,7 @@ class FillingProcess final : public Process {
   std::vector<Real> results() override;
   void solve_all_next() override;
   bool solves_again() const override;
+  bool steps_follow_sizes() const override { return has_fronts(); }
   Real progress() override { return filling_ ? state_.filled / scene_.cavity : 0; }
   std::vector<std::string> history_columns() const override;
   std::vector<HistoryCell> history_row() override;

@@ -10,7 +10,7 @@ LEVELS = ["draft", "standard", "fine", "reference"]
 LEVEL_SIZES = {"draft": 1.6, "standard": 1.0, "fine": 0.63, "reference": 0.5}
 
 # Section, key, and what is tried around the value in force: factors of a number, or other words.
-NUMBERS = [("time", "step", (2, 0.5)), ("motion", "strain", (2, 0.5)), ("solver", "newton_tolerance", (10, 0.1)),
+NUMBERS = [("accuracy", "size_factor", (1.4, 0.7)), ("time", "step", (2, 0.5)), ("motion", "strain", (2, 0.5)), ("solver", "newton_tolerance", (10, 0.1)),
            ("solver", "linear_tolerance", (100, 10, 0.1)), ("penalty", "penalty", (0.1, 10)), ("front", "cfl", (2, 0.5)),
            ("front", "thickness", (2,)), ("flow", "update_distance", (4, 2, 0.5)), ("remesh", "size", (1.4, 0.7)),
            ("remesh", "nodes", (0.5, 2)), ("solver", "cutoff_strain_rate", (10, 0.1))]

@@ -84,6 +84,17 @@ void AccuracySettings::describe(Section& s) {
   s.choice("level", level, choices, "preset of every setting that has a default by level; one given by itself wins");
   s.flag("two_meshes", two_meshes,
          "solve the first increment and one half-way on coarser meshes too, to estimate the error of space");
+  s.real("size_factor", size_factor, "", "the mesh is made anew before the run, with its sizes times this; 1: as it is")
+      .at_least(0.1)
+      .at_most(10);
+  s.real("target_error", target_error, "",
+         "relative error of forces or gate pressures to aim at: chooses size_factor and level by a trial on coarser "
+         "meshes; "
+         "those given by themselves stay")
+      .above(0)
+      .below(1);
+  s.real("target_time", target_time, "s", "wall time to stay within; chooses likewise, and wins over target_error")
+      .above(0);
 }
 
 void SolverSettings::describe(Section& s) {

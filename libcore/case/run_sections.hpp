@@ -46,6 +46,11 @@ struct TimeSettings {
 struct AccuracySettings {
   Level level = Level::standard;
   bool two_meshes = true;
+  Real size_factor = 1;              ///< of the mesh file's sizes
+  std::optional<Real> target_error;  ///< relative
+  std::optional<Real> target_time;   ///< s
+
+  bool has_targets() const { return target_error || target_time; }
 
   void describe(Section& s);
 };

@@ -18,8 +18,9 @@
 namespace malleus {
 namespace {
 
-constexpr int most_cuts = 12;           ///< of one increment's step, each to a half
-constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
+constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes take more than seconds to make coarser
+constexpr int most_cuts = 12;                      ///< of one increment's step, each to a half
+constexpr Real growth_after_cut = 1.5;             ///< of the step from one increment to the next
 constexpr Real wall_time_margin = 1.3;  ///< times the longest checkpoint, kept free before the wall time ends
 
 /// Equal shares of a state that was read on another number of ranks than wrote it.
@@ -75,7 +76,10 @@ int Engine::run() {
   timings_.reserve(64);  // references to entries stay valid
   check_field_order();
   print_plan();
-  if (settings_.check_only) return exit_code::done;
+  if (settings_.check_only) {
+    print_outlook();
+    return exit_code::done;
+  }
   open_outputs();
   if (settings_.increments && *settings_.increments == 0) return solve_once();
   return run_increments();
@@ -99,6 +103,19 @@ void Engine::check_field_order() {
 
 void Engine::print_plan() {
   report::print_plan(process_, settings_, comm_);
+}
+
+/// What a trial on coarser meshes tells of the time and the error of space.
+void Engine::print_outlook() {
+  if (process_.mesh().total_nodes() > most_nodes_of_trials * comm_.size()) return;
+  space_estimate_.prepare(process_);
+  const bool is_steady = settings_.increments && *settings_.increments == 0;
+  const auto outlook = space_estimate_.look_ahead(process_, settings_.step, is_steady);
+  if (!outlook) return;
+  const Real increments = static_cast<Real>(std::max<GlobalId>(process_.forecast().increments, 1));
+  log::info("tried on coarser meshes: {:.2g} s an increment, {} in all{}", outlook->increment_s,
+            report::duration(outlook->increment_s * increments),
+            outlook->error > 0 ? fmt::format("; error of space about {:.2g} %", 100 * outlook->error) : "");
 }
 
 void Engine::open_outputs() {

@@ -57,6 +57,7 @@ class Engine {
   };
 
   void print_plan();
+  void print_outlook();
   void check_field_order();
   void open_outputs();
   bool try_restart();

@@ -85,6 +85,8 @@ class Process {
   virtual void solve_all_next() {}
   /// Whether results() change in the course of the run beyond what the first increment tells of the mesh.
   virtual bool solves_again() const { return true; }
+  /// Whether a mesh of half the sizes takes twice as many increments.
+  virtual bool steps_follow_sizes() const { return false; }
   /// Sources of error that the process can tell at the end of a run, each once; the engine adds that of space.
   virtual ErrorBudget error_budget() { return {}; }
 

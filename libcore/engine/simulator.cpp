@@ -14,23 +14,15 @@
 #include "engine/engine.hpp"
 #include "engine/load_mesh.hpp"
 #include "engine/run_guarded.hpp"
+#include "engine/targets.hpp"
 #include "partition/balance.hpp"
+#include "remesh/distributed.hpp"
 
 namespace malleus {
 namespace {
 
 std::string level_name(Level level) {
-  switch (level) {
-    case Level::draft:
-      return "draft";
-    case Level::standard:
-      return "standard";
-    case Level::fine:
-      return "fine";
-    case Level::reference:
-      return "reference";
-  }
-  return "";
+  return std::string(level_names[static_cast<std::size_t>(level)]);
 }
 
 /// Prints what was asked for instead of a run; whether anything was.
@@ -151,7 +143,55 @@ int run_scene(const Communicator& comm, Simulator& simulator, Mesh mesh, RunSett
   return Engine(comm, *process, std::move(settings), std::move(on_mesh)).run();
 }
 
+/// The mesh anew with its sizes times a factor. Collective.
+void scale_sizes(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real factor) {
+  if (factor == 1) return;
+  const GlobalId before = mesh.total_nodes();
+  std::vector<Real> sizes = current_sizes(comm, mesh).values();
+  for (Real& size : sizes) size *= factor;
+  DistributedRemeshOptions options;
+  options.local.keep_volume = true;
+  remesh_distributed(comm, mesh, fields, Metric::per_node(std::move(sizes)), options);
+  log::info("[accuracy] size_factor = {:.3g}: {} nodes where the file has {}", factor, mesh.total_nodes(), before);
+}
+
+/// With [accuracy] target_error or target_time: the settings that they lead to, of those that the case does not give
+/// by itself. Collective.
+std::vector<std::string> settings_for_targets(const Communicator& comm, const CommandLine& line, Simulator& simulator,
+                                              const Mesh& mesh, CaseReader& reader) {
+  const AccuracySettings asked = simulator.common().accuracy;
+  const bool gives_level = reader.file().find_entry("accuracy", "", "level") != nullptr;
+  const bool gives_sizes = reader.file().find_entry("accuracy", "", "size_factor") != nullptr;
+  if (!asked.has_targets() || (gives_level && gives_sizes)) return {};
+  Expectation expected;
+  std::optional<Outlook> outlook;
+  {
+    const std::unique_ptr<Process> process = simulator.assemble(comm, mesh, reader);
+    SpaceEstimate trial(comm, [&](Mesh other) { return simulator.assemble(comm, std::move(other), reader); });
+    trial.prepare(*process);
+    const TimeSettings& time = simulator.time();
+    outlook = trial.look_ahead(*process, time.step.value_or(std::numeric_limits<Real>::infinity()),
+                               time.increments && *time.increments == 0);
+    expected.increments = static_cast<Real>(std::max<GlobalId>(process->forecast().increments, 1));
+    expected.dimension = mesh.dim;
+    expected.steps_follow_sizes = process->steps_follow_sizes();
+  }
+  if (!outlook) {
+    reader.fail("accuracy", asked.target_error ? "target_error" : "target_time",
+                "the mesh is so coarse that no coarser one can be tried: give size_factor and level by themselves");
+    reader.finish();
+  }
+  expected.outlook = *outlook;
+  const Choice choice = choose_for(asked, expected);
+  log::info("{}", choice.reason);
+  std::vector<std::string> settings = line.overrides;
+  if (!gives_sizes) settings.push_back(fmt::format("accuracy.size_factor={:.4g}", choice.size_factor));
+  if (!gives_level) settings.push_back("accuracy.level=" + level_name(choice.level));
+  return settings;
+}
+
 int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
+  simulator.forget();
   CommonSections& common = simulator.common();
   common.case_settings.name = line.case_file.stem().string();
   CaseReader reader(comm, CaseFile::read(comm, line.case_file, line.overrides));
@@ -165,10 +205,20 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   check_partition(common, reader);
   const MeshNames names = {mesh.dim, mesh.region_names, mesh.group_names};
   reader.check_mesh(names);
+  RunSettings settings = run_settings(line, simulator);
+  try {
+    if (std::vector<std::string> chosen = settings_for_targets(comm, line, simulator, mesh, reader); !chosen.empty()) {
+      CommandLine again = line;
+      again.overrides = std::move(chosen);
+      return run_case(comm, again, simulator);
+    }
+    scale_sizes(comm, mesh, file_fields, common.accuracy.size_factor);
+  } catch (const InputError& error) {
+    throw InputError(reader.located(error.what()));
+  }
   if (common.partition.method == PartitionMethod::cost && comm.size() > 1) {
     log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, solver_work(), true)));
   }
-  RunSettings settings = run_settings(line, simulator);
   try {
     return run_scene(comm, simulator, std::move(mesh), std::move(settings), reader);
   } catch (const InputError& error) {

@@ -19,6 +19,7 @@ class Simulator {
   virtual std::string program() const = 0;      ///< "forge"
   virtual std::string description() const = 0;  ///< one sentence, for --help
   virtual CommonSections& common() = 0;
+  virtual void forget() = 0;  ///< all settings read so far
   virtual const TimeSettings& time() const = 0;
   /// Binds every section, those of common() too. Local.
   virtual void describe(CaseReader& reader) = 0;

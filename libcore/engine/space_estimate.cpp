@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "engine/resources.hpp"
 #include "remesh/distributed.hpp"
 
 namespace malleus {
@@ -18,6 +19,7 @@ constexpr GlobalId fewest_elements = 8;  ///< of a mesh that says something
 constexpr Real lowest_order = 1;
 constexpr Real highest_order = 4;
 constexpr Real theoretical_order = 2;
+constexpr Real growth_of_time = 1.1;  ///< of an increment's time with the number of elements, as an exponent
 
 Real size_ratio(const Mesh& fine, const Mesh& coarse) {
   return std::pow(static_cast<Real>(fine.total_elements) / static_cast<Real>(coarse.total_elements), 1.0 / fine.dim);
@@ -134,6 +136,55 @@ void SpaceEstimate::compare(Process& process, const std::optional<Increment>& in
     }
   }
   twins_.clear();
+}
+
+std::optional<Outlook> SpaceEstimate::look_ahead(const Process& process, Real largest_step, bool steady) {
+  std::vector<Real> seconds;
+  std::vector<std::vector<Real>> results;
+  std::vector<Real> elements;
+  for (const auto& twin : twins_) {
+    const Real began = wall_clock();
+    const auto found = first_results_of(*twin, largest_step, steady);
+    if (!found) break;
+    seconds.push_back(comm_.max(wall_clock() - began));
+    results.push_back(*found);
+    elements.push_back(static_cast<Real>(twin->mesh().total_elements));
+  }
+  std::optional<Outlook> outlook;
+  if (!results.empty()) {
+    const Real ratio = size_ratio(process.mesh(), twins_[0]->mesh());
+    outlook =
+        Outlook{seconds[0] * std::pow(static_cast<Real>(process.mesh().total_elements) / elements[0], growth_of_time),
+                0, theoretical_order};
+    Real scale = 0;
+    for (const Real result : results[0]) scale += std::abs(result);
+    if (results.size() > 1 && results[1].size() == results[0].size() && scale > 0) {
+      const Real second_ratio = size_ratio(twins_[0]->mesh(), twins_[1]->mesh());
+      const Real of_twin = difference(results[0], results[1], scale) / (std::pow(second_ratio, theoretical_order) - 1);
+      outlook->error = of_twin / std::pow(ratio, theoretical_order);
+    }
+  }
+  twins_.clear();
+  return outlook;
+}
+
+std::optional<std::vector<Real>> SpaceEstimate::first_results_of(Process& twin, Real largest_step, bool steady) const {
+  {
+    const log::Silence silence;
+    try {
+      if (!steady) {
+        for (Component* component : twin.components()) component->start();
+      }
+    } catch (const InputError&) {
+      return std::nullopt;
+    } catch (const NumericsError&) {
+      return std::nullopt;
+    }
+  }
+  if (steady) return results_of(twin, std::nullopt);
+  const Real dt = std::min(largest_step, twin.largest_step());
+  if (!std::isfinite(dt) || !(dt > 0)) return std::nullopt;
+  return results_of(twin, Increment{1, dt, dt});
 }
 
 std::optional<ErrorShare> SpaceEstimate::share(bool remeshes) const {

@@ -32,6 +32,13 @@ Real observed_order(const MeshComparison& comparison);
 /// Richardson's estimate of the relative error on the finest mesh: difference / (r^order - 1).
 Real extrapolated_error(const MeshComparison& comparison);
 
+/// What the first increment on coarser meshes lets one expect of the first on the process' own.
+struct Outlook {
+  Real increment_s = 0;  ///< wall time
+  Real error = 0;        ///< of space, relative; 0 where only one coarser mesh could be made
+  Real order = 2;        ///< at which it falls with the sizes
+};
+
 /// Repeats increments of a process on coarser meshes. Collective throughout.
 class SpaceEstimate {
  public:
@@ -43,6 +50,10 @@ class SpaceEstimate {
   /// After that increment (none: of a scene that was solved as it stands): does the same there, and compares.
   void compare(Process& process, const std::optional<Increment>& increment);
 
+  /// After prepare() on a process that has not started: starts there, does the first increment (steady: solves the
+  /// scene as it stands), and extrapolates. largest_step: s. None where no coarser mesh could be made or solved.
+  std::optional<Outlook> look_ahead(const Process& process, Real largest_step, bool steady);
+
   /// Of the last comparison; none where no coarser mesh could be made or solved.
   std::optional<ErrorShare> share(bool remeshes) const;
 
@@ -52,6 +63,8 @@ class SpaceEstimate {
  private:
   std::unique_ptr<Process> coarser(const Process& fine, FieldStore& fine_fields) const;
   std::optional<std::vector<Real>> results_of(Process& process, const std::optional<Increment>& increment) const;
+
+  std::optional<std::vector<Real>> first_results_of(Process& twin, Real largest_step, bool steady) const;
 
   const Communicator& comm_;
   ProcessFactory factory_;
