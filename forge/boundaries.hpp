@@ -36,6 +36,8 @@ class Boundaries {
   const std::vector<BoundarySettings>& settings() const noexcept { return settings_; }
   /// [group + 1] whether tools and bodies may touch it: no velocity and no symmetry is imposed there.
   const std::vector<char>& is_free() const noexcept { return is_free_; }
+  /// Nodes on settings()[i], owned and copies, increasing. Local.
+  const std::vector<LocalId>& nodes(std::size_t i) const { return nodes_[i]; }
   bool has_loads() const;
   /// The largest velocity imposed at a time [m/s]. Collective.
   Real largest_speed(Real time) const;

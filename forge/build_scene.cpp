@@ -247,6 +247,7 @@ void build_scene(const Communicator& comm, Mesh mesh, const ForgeCase& forge_cas
   for (const BodyContactSettings& contact : forge_case.contacts) scene.pairs.push_back(resolve(scene, contact));
   scene.contact = {scene.penalty.penalty, scene.penalty.slip_scale * scene.scale.speed, 1e-5};
   declare_fields(scene);
+  build_thermal_scene(forge_case, scene);
   const std::vector<Real> volumes = body_volumes(scene);
   for (std::size_t region = 0; region < scene.bodies.size(); ++region) {
     scene.bodies[region].start_volume = volumes[region];

@@ -82,6 +82,7 @@ Outcome ContactFlow::advance(const Increment& increment) {
   report_ = {};
   tries_ = increment.number == tried_increment_ ? tries_ + 1 : 1;
   tried_increment_ = increment.number;
+  update_softening(scene_);
   const std::vector<Real> start = scene_.mesh.coordinates;
   const Outcome outcome = run_stages(increment);
   scene_.mesh.coordinates = start;
@@ -219,6 +220,8 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
     find_points(stage, surface);
     scene_.progress.was_pushed = is_pushed(stage.time);
     if (!scene_.progress.was_pushed) {
+      std::fill(state_.nodes.begin(), state_.nodes.end(), 0.0);
+      note_touching(stage, surface);
       rest();
       return Outcome::done();
     }
@@ -229,6 +232,7 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
       if (!update_contacts(stage, surface, pass)) break;
       if (pass == most_passes) return Outcome::retry("the contact pressures did not settle");
     }
+    note_touching(stage, surface);
     if (surprise(stage, surface) <= tolerated_surprise) return Outcome::done();
   }
   return Outcome::retry("nodes end within a tool");
@@ -270,6 +274,7 @@ void ContactFlow::find_points(const Stage& stage, const FreeSurface& surface) {
   contact_scene.pairs = scene_.pairs;
   contact_scene.bodies = scene_.body_scales;
   contact_scene.shear_stress = shear_stress;
+  if (scene_.thermal) contact_scene.softening = scene_.thermal->node_softening;
   contact_scene.memory = memory_;
   contact_scene.settings = scene_.contact;
   if (scene_.fields.has(field_name::contact_pressure) && !scene_.comm->any(!memory_.empty())) {

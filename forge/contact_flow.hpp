@@ -21,6 +21,18 @@ struct FlowReport {
   int contacts = 0;                     ///< active contact points
 };
 
+/// A surface node that touches what it faced in an increment's solve, for the heat that crosses and that friction
+/// makes.
+struct Touching {
+  std::size_t surface = 0;  ///< its place in FreeSurface::nodes()
+  LocalId slave = -1;
+  int opponent = 0;   ///< tools first, then pairs of bodies
+  Real area = 0;      ///< m^2
+  Real friction = 0;  ///< power of friction, W/m^2
+  std::array<GlobalId, 3> masters = {-1, -1, -1};
+  std::array<Real, 3> weights = {0, 0, 0};
+};
+
 /// Totals of a run.
 struct FlowTotals {
   GlobalId linear_solves = 0;
@@ -47,6 +59,8 @@ class ContactFlow final : public Component {
 
   const FlowReport& report() const noexcept { return report_; }
   const FlowTotals& totals() const noexcept { return totals_; }
+  /// Of the last solve: points under pressure, and those whose gap is closed. Filled where the scene has heat.
+  const std::vector<Touching>& touching() const noexcept { return touching_; }
   /// Whether advance() fills the stress field, of the same state and mesh as velocity and pressure.
   void set_keeps_stress(bool keeps) { keeps_stress_ = keeps; }
   /// Nothing fixed the mean pressure of the last solve.
@@ -111,6 +125,7 @@ class ContactFlow final : public Component {
   bool update_rubbing(int pass);
   /// Largest depth at which a node ends within a tool that its linearised gap did not foresee, in edges. Collective.
   Real surprise(const Stage& stage, const FreeSurface& surface);
+  void note_touching(const Stage& stage, const FreeSurface& surface);
   void measure_forces();
   void store_fields();
   void measure_rates();
@@ -129,7 +144,8 @@ class ContactFlow final : public Component {
   std::vector<ContactTraction> tractions_;    ///< [contact point] at the solution
   std::vector<Real> gaps_;                    ///< [contact point] m, at the end of the increment
   std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
-  bool has_contacts_ = false;                 ///< on any rank
+  std::vector<Touching> touching_;
+  bool has_contacts_ = false;  ///< on any rank
   bool keeps_stress_ = true;
   bool is_cold_ = true;  ///< no solution tells Newton's method where to start
   GlobalId tried_increment_ = -1;

@@ -8,6 +8,8 @@ namespace {
 /// Limits of friction have settled where they change by less than this share of all friction.
 constexpr Real settled_friction = 1e-3;
 constexpr int most_friction_passes = 6;
+/// Gaps below this share of an edge let heat through.
+constexpr Real closed_gap = 1e-3;
 /// Share of the contact area that must come to hold for a pass with its friction in the same increment.
 constexpr Real many_points = 0.05;
 
@@ -160,6 +162,27 @@ Real ContactFlow::surprise(const Stage& stage, const FreeSurface& surface) {
   }
   report_.max_penetration = scene_.comm->max(report_.max_penetration);
   return scene_.comm->max(worst);
+}
+
+void ContactFlow::note_touching(const Stage& stage, const FreeSurface& surface) {
+  touching_.clear();
+  if (!scene_.thermal) return;
+  const auto components = static_cast<std::size_t>(scene_.dim() + 1);
+  std::vector<Real> unknowns(static_cast<std::size_t>(contact_space_->nodes()) * components, 0.0);
+  std::copy_n(state_.nodes.begin(), static_cast<std::size_t>(contact_space_->owned()) * components, unknowns.begin());
+  contact_space_->halo().update_copies(unknowns, scene_.dim() + 1);
+  const Real effective_step = stage.displacement.step * stage.displacement.now;
+  for (const ContactPoint& point : contact_.points()) {
+    const Vector slip = contact_.slip(point, *contact_space_, unknowns);
+    const ContactTraction traction = ContactTerm::traction(point, slip);
+    const Real gap = -effective_step * (point.normal.offset - point.normal.normal.dot(slip));
+    const auto body = static_cast<std::size_t>(surface.body_of_node(point.slave));
+    const bool presses = scene_.progress.was_pushed && traction.pressure > 0;
+    if (!presses && gap > closed_gap * scene_.body_scales[body].edge) continue;
+    const Vector shear = traction.traction - traction.pressure * point.normal.normal;
+    const Real power = presses && point.rubs ? std::max(0.0, -shear.dot(slip)) : 0;
+    touching_.push_back({point.surface, point.slave, point.opponent, point.area, power, point.masters, point.weights});
+  }
 }
 
 void ContactFlow::measure_forces() {

@@ -78,7 +78,8 @@ void set_friction(const ContactScene& scene, const FrictionSpec& spec, ContactPo
   const Real pressure = memory != nullptr ? memory->pressure : known;
   const Real stress =
       scene.shear_stress.empty() ? unlimited : scene.shear_stress[static_cast<std::size_t>(point.slave)];
-  point.friction = friction_term(spec, body.consistency, stress, pressure, scene.settings.slip_scale);
+  const Real softening = scene.softening.empty() ? 1 : scene.softening[static_cast<std::size_t>(point.slave)];
+  point.friction = friction_term(spec, body.consistency * softening, stress, pressure, scene.settings.slip_scale);
 }
 
 void add_tool_contacts(const ContactScene& scene, const Prediction& prediction, std::vector<ContactPoint>& points) {

@@ -58,6 +58,7 @@ struct ContactScene {
   std::span<const BodyPair> pairs;
   std::span<const BodyScale> bodies;      ///< [region]
   std::span<const Real> shear_stress;     ///< [local node] of the last known state, Pa; may be empty: unlimited
+  std::span<const Real> softening;        ///< [local node] of the consistency; empty: none softens
   std::span<const ContactMemory> memory;  ///< sorted by slave, opponent
   /// [local node] Pa, where the memory was lost (a restart, another mesh): nodes under pressure that are near an
   /// opponent are taken to hold. Empty: the memory is right.

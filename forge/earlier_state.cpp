@@ -48,8 +48,8 @@ EarlierState read_earlier_state(const Communicator& comm, const Mesh& expected,
 }
 
 void take_over(const EarlierState& earlier, FieldStore& fields) {
-  for (const char* name : {field_name::equivalent_strain}) {
-    if (!earlier.fields.has(name)) continue;
+  for (const char* name : {field_name::equivalent_strain, field_name::temperature}) {
+    if (!earlier.fields.has(name) || !fields.has(name)) continue;
     const auto values = earlier.fields[name].values();
     fields[name].assign(std::vector<Real>(values.begin(), values.end()));
   }

@@ -21,7 +21,17 @@ void BodySettings::describe(Section& s) {
       .starter("179.2 MPa.s^m")
       .exponent_is("rate_sensitivity", rate_sensitivity);
   s.real("viscosity", viscosity, "Pa.s", "of a newtonian body, in place of consistency").above(0);
-  s.real("density", density, "kg/m^3", "for gravity").above(0);
+  s.real("density", density, "kg/m^3", "for gravity and heat").above(0);
+  s.real("conductivity", conductivity, "W/m/K", "with [thermal]").at_least(0);
+  s.real("heat_capacity", heat_capacity, "J/kg/K",
+         "with [thermal]; a rigid body without it keeps its temperature at the start")
+      .above(0);
+  s.expression("temperature", temperature, "K", "at the start, with [thermal]")
+      .above(0)
+      .default_is("[thermal] initial");
+  s.temperature_formula("softening", softening, "",
+                        "what the consistency is multiplied with at the temperature T in K, with [thermal]: "
+                        "\"exp(3000*(1/T-1/1373))\"");
 }
 
 void BodySettings::validate(Section& s) const {
@@ -36,6 +46,7 @@ void BodySettings::validate(Section& s) const {
   if (law == BodyLaw::rigid) {
     s.refuse("consistency", "law = rigid does not deform");
     s.refuse("viscosity", "law = rigid does not deform");
+    s.refuse("softening", "law = rigid does not deform");
   }
 }
 
@@ -67,6 +78,8 @@ void BodyContactSettings::describe(Section& s) {
       .at_least(1)
       .at_most(1e9)
       .or_word("auto");
+  s.real("heat_transfer", heat_transfer, "W/m^2/K", "between the surfaces where they touch, with [thermal]")
+      .at_least(0);
 }
 
 void BodyContactSettings::validate(Section& s) const {
@@ -162,7 +175,7 @@ void ForgeCase::validate(CaseReader& reader) const {
   const auto refuse = [&](bool is_there, const char* section, const char* message) {
     if (is_there) reader.fail(section, "", message);
   };
-  refuse(common.thermal.has_value(), "thermal", "forge models no heat yet; remove the section");
+  validate_heat(reader);
   refuse(common.inertia.has_value(), "inertia", "forge models no inertia yet; remove the section");
   refuse(common.air.has_value(), "air", "forge models no trapped air; remove the section");
   if (common.reference && common.reference->level_set) {
@@ -192,6 +205,19 @@ void ForgeCase::validate(CaseReader& reader) const {
     if (!both && contact.bodies.empty() && !two_bodies) {
       reader.fail("contact." + contact.name, "slave", "give slave and master, or the two `bodies`");
     }
+  }
+}
+
+void ForgeCase::validate_heat(CaseReader& reader) const {
+  common.refuse_heat_without_thermal(reader);
+  if (!common.thermal) return;
+  for (const BodySettings& body : bodies) {
+    const bool is_modelled = body.law != BodyLaw::rigid || body.heat_capacity || body.conductivity;
+    if (!is_modelled) continue;
+    const std::string section = "body." + body.name;
+    if (!body.density) reader.fail(section, "density", "[thermal] needs the density of the body");
+    if (!body.heat_capacity) reader.fail(section, "heat_capacity", "[thermal] needs the heat capacity of the body");
+    if (!body.conductivity) reader.fail(section, "conductivity", "[thermal] needs the conductivity of the body");
   }
 }
 

@@ -15,6 +15,9 @@
 
 namespace malleus::forge {
 
+/// Between surfaces under pressure, where the case gives nothing else, W/(m^2 K).
+inline constexpr Real default_heat_transfer = 1e4;
+
 enum class BodyLaw { norton_hoff, newtonian, rigid };
 
 /// [body.NAME]
@@ -26,6 +29,11 @@ struct BodySettings {
   Real rate_sensitivity = 1;        ///< m
   std::optional<Real> viscosity;    ///< newtonian, Pa.s
   std::optional<Real> density;      ///< kg/m^3
+  // With [thermal]:
+  std::optional<Real> conductivity;       ///< W/(m K)
+  std::optional<Real> heat_capacity;      ///< J/(kg K)
+  std::optional<Expression> temperature;  ///< K, at the start
+  std::optional<Expression> softening;    ///< of T: what the consistency is multiplied with
 
   void describe(Section& s);
   void validate(Section& s) const;
@@ -74,6 +82,9 @@ struct ToolSettings {
   std::optional<Real> start_height;    ///< m
   std::optional<Real> energy;          ///< J
   std::optional<Real> mass;            ///< kg
+  // With [thermal]:
+  std::optional<Real> temperature;    ///< K
+  std::optional<Real> heat_transfer;  ///< W/(m^2 K)
 
   void describe(Section& s);
   void validate(Section& s) const;
@@ -97,6 +108,7 @@ struct BodyContactSettings {
   std::vector<std::string> bodies;    ///< the two, where the rules shall choose
   FrictionSettings friction;
   std::optional<Real> penalty;
+  Real heat_transfer = default_heat_transfer;  ///< W/(m^2 K), with [thermal]
 
   void describe(Section& s);
   void validate(Section& s) const;
@@ -146,6 +158,9 @@ struct ForgeCase {
   void validate(CaseReader& reader) const;
   /// Whether some tool or boundary has a stroke.
   bool anything_moves() const;
+
+ private:
+  void validate_heat(CaseReader& reader) const;
 };
 
 }  // namespace malleus::forge

@@ -35,6 +35,18 @@ PressState press_state(const nlohmann::json& json) {
   return state;
 }
 
+nlohmann::json heat_json(const HeatTotals& totals) {
+  return {{"stored_J", totals.stored},
+          {"dissipated_J", totals.dissipated},
+          {"friction_J", totals.friction},
+          {"imposed_J", totals.imposed},
+          {"lost_J", totals.lost}};
+}
+
+HeatTotals heat_totals(const nlohmann::json& json) {
+  return {json.at("stored_J"), json.at("dissipated_J"), json.at("friction_J"), json.at("imposed_J"), json.at("lost_J")};
+}
+
 /// Whether an output or a probe shows the field.
 bool is_recorded(const CommonSections& common, const std::string& field) {
   const auto shows = [&](const std::vector<std::string>& names) {
@@ -51,6 +63,7 @@ ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> s
   if (case_.common.remesh && case_.common.remesh->active) remeshing_.emplace(*case_.common.remesh, remeshed_scene());
   flow_.set_keeps_stress(is_recorded(case_.common, field_name::stress));
   if (case_.common.reference) errors_.emplace(*scene_, flow_, *case_.common.reference);
+  if (scene_->thermal) heat_.emplace(*scene_, flow_);
   if (case_.common.probes.empty()) return;
   probes_.emplace(*scene_->comm, scene_->mesh, case_.common.probes);
   if (probes_->any_moves()) tracers_.emplace(*probes_, scene_->mesh, scene_->fields);
@@ -62,6 +75,7 @@ std::vector<Component*> ForgeProcess::components() {
   list.push_back(&flow_);
   if (errors_) list.push_back(&*errors_);
   if (tracers_) list.push_back(&*tracers_);
+  if (heat_) list.push_back(&*heat_);
   list.push_back(&motion_);
   return list;
 }
@@ -172,7 +186,9 @@ Real ForgeProcess::largest_step() {
   if (!scene_->progress.was_pushed && !scene_->boundaries->has_loads() &&
       !(scene_->boundaries->largest_speed(scene_->progress.time) > 0)) {
     const Real free = flow_.time_to_touch(scene_->progress.time);
-    if (free > 0) step = std::min(case_.time.step.value_or(no_limit), std::isfinite(free) ? free : step);
+    // Where nothing will ever touch only heat goes on, and [time] says in which steps.
+    const Real idle = heat_ ? no_limit : step;
+    if (free > 0) step = std::min(case_.time.step.value_or(no_limit), std::isfinite(free) ? free : idle);
   }
   return step;
 }
@@ -291,6 +307,10 @@ std::vector<std::string> ForgeProcess::history_columns() const {
     for (int c = 0; c < scene_->dim(); ++c) columns.push_back(fmt::format("force_{}_{}_N", one.name, "xyz"[c]));
     columns.push_back(fmt::format("stroke_{}_m", one.name));
   }
+  if (heat_) {
+    for (const Body& body : scene_->bodies) columns.push_back(fmt::format("temperature_{}_K", body.name));
+    for (const char* name : {"min_temperature_K", "max_temperature_K"}) columns.emplace_back(name);
+  }
   if (errors_) {
     for (std::string& name : errors_->columns()) columns.push_back(std::move(name));
   }
@@ -313,6 +333,9 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
     const Vector force = force_on(one);
     for (int c = 0; c < scene_->dim(); ++c) row.emplace_back(force[c]);
     row.emplace_back(stroke_of(one));
+  }
+  if (heat_) {
+    for (const Real temperature : body_temperatures(*scene_)) row.emplace_back(temperature);
   }
   if (errors_ && !errors_->columns().empty()) {
     const nlohmann::json& errors = errors_->errors();
@@ -361,6 +384,7 @@ nlohmann::json ForgeProcess::accuracy() {
                          {"max_penetration_m", max_penetration_},
                          {"force_imbalance", max_imbalance_},
                          {"newton_iterations", newton_total_}};
+  if (heat_) json["heat"] = heat_json(heat_->totals());
   if (errors_) json["errors"] = errors_->errors();
   return json;
 }
@@ -387,6 +411,7 @@ nlohmann::json ForgeProcess::save_state() const {
                           {"edge_rate", flow_.largest_edge_rate()},
                           {"strain_rate", flow_.largest_strain_rate()}};
   if (remeshing_) state["remeshing"] = remeshing_->save();
+  if (heat_) state["heat"] = heat_json(heat_->totals());
   for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
   for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
   return state;
@@ -416,6 +441,7 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   flow_.mesh_changed();
   flow_.set_rates(state.at("edge_rate"), state.at("strain_rate"));
   if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
+  if (heat_ && state.contains("heat")) heat_->set_totals(heat_totals(state.at("heat")));
   const std::vector<Real> volumes = body_volumes(*scene_);
   for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
     scene_->bodies[i].start_volume = state.at("start_volumes").at(i);

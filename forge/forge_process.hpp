@@ -6,6 +6,7 @@
 
 #include "engine/process.hpp"
 #include "engine/remeshing.hpp"
+#include "forge/heat.hpp"
 #include "forge/known_errors.hpp"
 #include "forge/motion.hpp"
 
@@ -69,6 +70,7 @@ class ForgeProcess final : public Process {
   std::optional<Remeshing> remeshing_;
   std::optional<KnownErrors> errors_;
   std::optional<TracerMotion> tracers_;
+  std::optional<Heat> heat_;
   Motion motion_;
   int last_newton_ = 0;
   Real last_stroke_ = 0;      ///< m, of the leading tool or boundary

@@ -3,6 +3,7 @@
 /// What the components of a forging process share.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "forge/boundaries.hpp"
 #include "forge/contact_search.hpp"
 #include "forge/forge_case.hpp"
+#include "forge/thermal_scene.hpp"
 
 namespace malleus::forge {
 
@@ -58,6 +60,7 @@ struct Scene {
   std::vector<BodyScale> body_scales;  ///< [region]
   std::unique_ptr<Boundaries> boundaries;
   std::unique_ptr<const ViscosityModel> viscosity;
+  std::optional<ThermalScene> thermal;  ///< where the case models heat
   ContactSettings contact;
   PenaltySettings penalty;
   MotionSettings motion;
@@ -85,6 +88,7 @@ inline constexpr const char* stress = "stress";
 inline constexpr const char* contact_pressure = "contact_pressure";
 inline constexpr const char* contact_gap = "contact_gap";
 inline constexpr const char* quality = "quality";
+inline constexpr const char* temperature = "temperature";
 }  // namespace field_name
 
 /// Declares the fields that every forging scene has.

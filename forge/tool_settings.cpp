@@ -15,6 +15,12 @@ void ToolSettings::describe(Section& s) {
   describe_shape(s);
   describe_motion(s);
   friction.describe(s);
+  s.real("temperature", temperature, "K", "of the tool, which keeps it, with [thermal]")
+      .above(0)
+      .default_is("[thermal] ambient where heat_transfer is given; else no heat crosses");
+  s.real("heat_transfer", heat_transfer, "W/m^2/K", "to bodies that touch the tool, with [thermal]")
+      .at_least(0)
+      .default_is("10 kW/m^2/K where temperature is given");
 }
 
 void ToolSettings::describe_shape(Section& s) {

@@ -338,6 +338,7 @@ void InjectCase::check(CaseReader& reader) const {
     if (is_given) reader.fail(section, "", why);
   };
   refuse(common.thermal.has_value(), "thermal", "inject models no heat yet; remove the section");
+  common.refuse_heat_without_thermal(reader);
   refuse(common.inertia.has_value(), "inertia", "inject models no inertia yet; remove the section");
   refuse(common.air.has_value(), "air", "inject does not compress trapped air yet; remove the section");
   if (front.transport == FrontSettings::Transport::trace) {

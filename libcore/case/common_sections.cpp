@@ -19,6 +19,15 @@ void CommonSections::describe_scene(CaseReader& reader) {
   reader.repeated("probe", probes, "points at which fields are recorded");
 }
 
+void CommonSections::refuse_heat_without_thermal(CaseReader& reader) const {
+  if (thermal) return;
+  for (const BoundarySettings& boundary : boundaries) {
+    if (!boundary.has_heat()) continue;
+    reader.fail("boundary." + boundary.name, boundary.temperature ? "temperature" : "heat_flux",
+                "no heat is modelled: add a section [thermal], or remove the key");
+  }
+}
+
 void CommonSections::describe_run(CaseReader& reader) {
   reader.section("solver", solver, "nonlinear and linear solver");
   reader.optional("remesh", remesh, "adaptive remeshing; without this section there is none");

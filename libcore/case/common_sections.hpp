@@ -36,6 +36,8 @@ struct CommonSections {
   void describe_scene(CaseReader& reader);
   /// [solver] to [partition]: how it is run.
   void describe_run(CaseReader& reader);
+  /// Boundaries give temperatures and heat only where heat is modelled: mistakes at those that do without. Local.
+  void refuse_heat_without_thermal(CaseReader& reader) const;
 };
 
 }  // namespace malleus

@@ -58,11 +58,17 @@ void refuse_foreign_syntax(std::string_view text) {
 /// The compiled text and the variables it reads.
 class Expression::Formula {
  public:
-  explicit Formula(const std::string& text) {
-    parser_.DefineVar("x", &x_);
-    parser_.DefineVar("y", &y_);
-    parser_.DefineVar("z", &z_);
-    parser_.DefineVar("t", &t_);
+  /// The variables are x, y, z, t, or T alone, which stands in the place of x.
+  Formula(const std::string& text, bool is_of_temperature) {
+    if (is_of_temperature) {
+      variables_ = {"T"};
+      parser_.DefineVar("T", &x_);
+    } else {
+      parser_.DefineVar("x", &x_);
+      parser_.DefineVar("y", &y_);
+      parser_.DefineVar("z", &z_);
+      parser_.DefineVar("t", &t_);
+    }
     // muParser's own _pi has but twelve digits after the point.
     for (const char* name : {"pi", "_pi"}) parser_.DefineConst(name, std::numbers::pi);
     for (const char* name : {"e", "_e"}) parser_.DefineConst(name, std::numbers::e);
@@ -92,15 +98,18 @@ class Expression::Formula {
     const std::size_t position = is_placed ? static_cast<std::size_t>(error.GetPos()) : 0;
     const std::string token = error.GetToken();
     if (error.GetCode() != mu::ecUNASSIGNABLE_TOKEN) return fault_at(text, position, error.GetMsg());
-    std::vector<std::string> known = {"x", "y", "z", "t"};
+    std::vector<std::string> known = variables_;
     for (const auto& [name, value] : parser_.GetConst()) known.push_back(name);
     for (const auto& [name, function] : parser_.GetFunDef()) known.push_back(name);
     const std::string hint = did_you_mean(token, known);
-    const std::string allowed = hint.empty() ? "; known are x, y, z, t, pi, e and muParser's functions" : hint;
+    const std::string names =
+        fmt::format("; known are {}, pi, e and muParser's functions", fmt::join(variables_, ", "));
+    const std::string allowed = hint.empty() ? names : hint;
     return fault_at(text, position, fmt::format("unknown '{}'{}", token, allowed));
   }
 
   mu::Parser parser_;
+  std::vector<std::string> variables_ = {"x", "y", "z", "t"};
   Real x_ = 0;
   Real y_ = 0;
   Real z_ = 0;
@@ -112,11 +121,19 @@ class Expression::Formula {
 Expression::Expression(Real constant) : text_(format_real(constant)), constant_(constant) {}
 
 Expression Expression::parse(std::string_view text) {
+  return compile(text, false);
+}
+
+Expression Expression::parse_of_temperature(std::string_view text) {
+  return compile(text, true);
+}
+
+Expression Expression::compile(std::string_view text, bool is_of_temperature) {
   const std::string formula_text(trim(text));
   if (formula_text.empty()) throw InputError("an empty expression");
   refuse_foreign_syntax(formula_text);
   const TrapsAtRest rest;
-  const auto formula = std::make_shared<Formula>(formula_text);
+  const auto formula = std::make_shared<Formula>(formula_text, is_of_temperature);
   Expression result;
   result.text_ = formula_text;
   if (formula->uses_position() || formula->uses_time()) {
@@ -169,6 +186,13 @@ Real Expression::finite_at(const std::array<Real, 3>& point, Real time) const {
   const Real value = (*this)(point, time);
   if (!std::isfinite(value)) refuse_value(point, time, value);
   return value;
+}
+
+Real Expression::at_temperature(Real temperature) const {
+  const Real value = (*this)({temperature, 0, 0}, 0);
+  if (std::isfinite(value)) return value;
+  throw InputError(fmt::format("{}expression '{}' gives {} at T = {:.6g} K", source_.empty() ? "" : source_ + ": ",
+                               text_, value, temperature));
 }
 
 void Expression::evaluate_finite(std::span<const Real> coordinates, int dimension, Real time,

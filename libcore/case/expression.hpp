@@ -23,6 +23,8 @@ class Expression {
 
   /// Throws InputError that quotes the text and names the position of what is not understood. Local.
   static Expression parse(std::string_view text);
+  /// A formula of the temperature T [K] alone, see at_temperature(). Errors as parse(). Local.
+  static Expression parse_of_temperature(std::string_view text);
 
   bool is_constant() const { return formula_ == nullptr; }
   bool depends_on_position() const;
@@ -40,6 +42,9 @@ class Expression {
   Real finite_at(const std::array<Real, 3>& point, Real time) const;
   void evaluate_finite(std::span<const Real> coordinates, int dimension, Real time, std::span<Real> values) const;
 
+  /// Of a formula of the temperature [K], or a constant; throws InputError where it is not finite. Local.
+  Real at_temperature(Real temperature) const;
+
   /// "case.ini:12: [reference] pressure", for messages; empty where no case file gave it.
   const std::string& source() const { return source_; }
   void set_source(const std::string& source) { source_ = source; }
@@ -47,6 +52,7 @@ class Expression {
  private:
   class Formula;
 
+  static Expression compile(std::string_view text, bool is_of_temperature);
   [[noreturn]] void refuse_value(const std::array<Real, 3>& point, Real time, Real value) const;
 
   std::string text_;

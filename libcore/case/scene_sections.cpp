@@ -23,8 +23,12 @@ void GravitySettings::describe(Section& s) {
 
 void ThermalSettings::describe(Section& s) {
   s.expression("initial", initial, "K", "temperature at the start").above(0);
-  s.real("ambient", ambient, "K", "temperature that free surfaces radiate to").above(0);
-  s.real("emissivity", emissivity, "", "of free surfaces").at_least(0).at_most(1);
+  s.real("ambient", ambient, "K", "temperature around free surfaces").above(0);
+  s.real("emissivity", emissivity, "", "of free surfaces, which radiate to the surroundings").at_least(0).at_most(1);
+  s.real("convection", convection, "W/m^2/K", "from free surfaces to the surroundings").at_least(0);
+  s.real("dissipation", dissipation, "", "share of the power of deformation that becomes heat (Taylor and Quinney)")
+      .at_least(0)
+      .at_most(1);
 }
 
 void AirSettings::describe(Section& s) {
@@ -81,12 +85,17 @@ void BoundarySettings::describe(Section& s) {
   s.vector("traction", traction, "Pa", "force per area, one number a dimension");
   s.expressions("traction", traction_components, "Pa", "its components one by one");
   s.expression("pressure", pressure, "Pa", "pressure that presses on the body");
+  s.expression("temperature", temperature, "K", "imposed temperature, with [thermal]").above(0);
+  s.expression("heat_flux", heat_flux, "W/m^2", "heat that flows in, with [thermal]");
 }
 
 void BoundarySettings::validate(Section& s) const {
+  s.refuse_more_than_one_of({"temperature", "heat_flux"});
   const bool imposes = has_velocity() || has_traction() || pressure.has_value();
   if (type == Type::symmetry && imposes) s.fail("type", "symmetry allows no velocity, traction or pressure");
-  if (type == Type::imposed && !imposes) s.fail("needs velocity, traction, pressure or type = symmetry");
+  if (type == Type::imposed && !imposes && !has_heat()) {
+    s.fail("needs velocity, traction, pressure or type = symmetry");
+  }
   refuse_two_causes(s);
   for (const std::string_view axis : axes) {
     for (const std::string_view quantity : {"velocity", "traction"}) {

@@ -30,8 +30,10 @@ struct InertiaSettings {
 /// [thermal]: its presence adds the heat equation. Bodies, fluids, tools and walls give their own constants.
 struct ThermalSettings {
   Expression initial = Expression(293.15);  ///< K
-  Real ambient = 293.15;                    ///< K, what free surfaces radiate to
+  Real ambient = 293.15;                    ///< K, around free surfaces
   Real emissivity = 0;                      ///< of free surfaces
+  Real convection = 0;                      ///< W/(m^2 K), from free surfaces to the surroundings
+  Real dissipation = 1;                     ///< Taylor-Quinney: share of the power of deformation that becomes heat
 
   void describe(Section& s);
 };
@@ -100,6 +102,8 @@ struct BoundarySettings {
   std::optional<std::array<Real, 3>> traction;                 ///< Pa
   ExpressionVector traction_components;                        ///< Pa
   std::optional<Expression> pressure;                          ///< Pa, pressing on the body
+  std::optional<Expression> temperature;                       ///< K, imposed
+  std::optional<Expression> heat_flux;                         ///< W/m^2, into the material
 
   void describe(Section& s);
   void validate(Section& s) const;
@@ -110,6 +114,7 @@ struct BoundarySettings {
   /// Of either form; 0 where nothing is given. The pressure comes on top, along the normal.
   std::array<Expression, 3> imposed_traction() const;
   bool has_traction() const;
+  bool has_heat() const { return temperature || heat_flux; }
 
  private:
   void refuse_two_causes(Section& s) const;

@@ -103,6 +103,11 @@ KeyOf<Expression> Section::expression(std::string_view name, std::optional<Expre
   return custom(name, member, expression_converter(unit), text);
 }
 
+KeyOf<Expression> Section::temperature_formula(std::string_view name, std::optional<Expression>& member,
+                                               std::string_view unit, std::string_view text) {
+  return custom(name, member, temperature_formula_converter(unit), text);
+}
+
 void Section::expressions(std::string_view name, std::array<std::optional<Expression>, 3>& members,
                           std::string_view unit, std::string_view text) {
   for (std::size_t i = 0; i < members.size(); ++i) {

@@ -57,6 +57,9 @@ class Section {
   KeyOf<Expression> expression(std::string_view name, Expression& member, std::string_view unit, std::string_view text);
   KeyOf<Expression> expression(std::string_view name, std::optional<Expression>& member, std::string_view unit,
                                std::string_view text);
+  /// A formula of the temperature T.
+  KeyOf<Expression> temperature_formula(std::string_view name, std::optional<Expression>& member, std::string_view unit,
+                                        std::string_view text);
   /// The keys name_x, name_y, name_z.
   void expressions(std::string_view name, std::array<std::optional<Expression>, 3>& members, std::string_view unit,
                    std::string_view text);

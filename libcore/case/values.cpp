@@ -205,9 +205,12 @@ Converter<std::array<std::optional<Real>, 3>> partial_vector_converter(std::stri
   return {"vector, or 'free' for a free component", unit_text, read, write};
 }
 
-Converter<Expression> expression_converter(std::string_view unit) {
+namespace {
+
+Converter<Expression> formula_converter(std::string_view unit, Expression (*parse)(std::string_view),
+                                        const std::string& type) {
   const Unit wanted = coherent_unit(unit);
-  const auto read = [wanted](std::string_view raw, Key&) {
+  const auto read = [wanted, parse](std::string_view raw, Key&) {
     const std::string_view text = trim(without_quotes(raw));
     std::optional<InputError> not_a_number;
     try {
@@ -216,7 +219,7 @@ Converter<Expression> expression_converter(std::string_view unit) {
       not_a_number = error;
     }
     try {
-      return Expression::parse(text);
+      return parse(text);
     } catch (const InputError&) {
       if (looks_like_quantity(text)) throw InputError(*not_a_number);
       throw;
@@ -226,7 +229,17 @@ Converter<Expression> expression_converter(std::string_view unit) {
   const auto write = [unit_text](const Expression& value) {
     return value.is_constant() ? with_unit(format_real(value({}, 0)), unit_text) : fmt::format("\"{}\"", value.text());
   };
-  return {"number or expression", unit_text, read, write};
+  return {type, unit_text, read, write};
+}
+
+}  // namespace
+
+Converter<Expression> expression_converter(std::string_view unit) {
+  return formula_converter(unit, &Expression::parse, "number or expression");
+}
+
+Converter<Expression> temperature_formula_converter(std::string_view unit) {
+  return formula_converter(unit, &Expression::parse_of_temperature, "number or expression of the temperature T (K)");
 }
 
 Converter<std::filesystem::path> path_converter() {

@@ -28,6 +28,8 @@ Converter<std::array<Real, 3>> vector_converter(std::string_view unit);
 Converter<std::array<std::optional<Real>, 3>> partial_vector_converter(std::string_view unit);
 /// A number with unit, or a formula in SI, in quotes or without.
 Converter<Expression> expression_converter(std::string_view unit);
+/// The same with a formula of the temperature T [K].
+Converter<Expression> temperature_formula_converter(std::string_view unit);
 /// Relative paths are taken from the case file's directory.
 Converter<std::filesystem::path> path_converter();
 /// Index of the name among the choices.

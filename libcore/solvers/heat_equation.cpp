@@ -192,7 +192,8 @@ std::vector<Real> HeatEquation::residual(const HeatScene& scene, const NodeSpace
       difference += ends.parts[i] * known[index(space.local_node(ends.nodes[i]))];
     }
     for (std::size_t i = 0; i < ends.count; ++i) {
-      sums[index(space.local_node(ends.nodes[i]))] += ends.parts[i] * bridge.conductance * difference;
+      const Real given = i > 0 ? ends.parts[i] * bridge.source : 0;
+      sums[index(space.local_node(ends.nodes[i]))] += ends.parts[i] * bridge.conductance * difference + given;
     }
   }
   space.halo().add_to_owners(std::span(sums), 1);
@@ -296,6 +297,7 @@ HeatReport HeatEquation::account(const HeatScene& scene, Real dt, std::span<cons
     sums[0] += masses_[index(node)] * (t - before[index(node)]);
     if (is_fixed_[index(node)] != 0) sums[3] += dt * residual[index(node)];
   }
+  for (const HeatBridge& bridge : scene.bridges) sums[1] += dt * bridge.source;
   with_dim(mesh_.dim, [&](auto d) {
     constexpr int D = decltype(d)::value;
     for (LocalId e = 0; e < mesh_.elements() && !scene.element_source.empty(); ++e) {

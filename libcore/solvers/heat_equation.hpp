@@ -20,6 +20,7 @@ struct HeatBridge {
   Real conductance = 0;  ///< W/K
   std::array<GlobalId, 3> partners = {-1, -1, -1};
   std::array<Real, 3> weights = {0, 0, 0};
+  Real source = 0;  ///< W, given to the partners by their weights
 };
 
 /// What a step conducts and what it is given. Values at nodes are [local node], and those of copies add to their
