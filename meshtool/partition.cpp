@@ -194,7 +194,7 @@ PartitionPlan release_plan(const Communicator& comm, const Mesh& mesh, const Par
   const std::vector<Real> work = element_work(comm, mesh, command.model);
   ReleaseOptions options;
   options.tolerance = command.options.tolerance;
-  options.balanced = command.release == "balanced";
+  options.aim = command.release == "balanced" ? ReleaseAim::equal_loads : ReleaseAim::most_released;
   Release release = move_interfaces_inside(comm, mesh, work, architecture, from, options);
   PartitionPlan plan;
   plan.parts = std::move(release.parts);

@@ -163,4 +163,38 @@ std::vector<int> assign_nodes(const Communicator& comm, const Mesh& mesh, const 
   return part_of_node;
 }
 
+AroundNodes spread_split_nodes(const Communicator& comm, const Mesh& mesh, const SplitNodes& split) {
+  std::vector<std::vector<int>> lists(static_cast<std::size_t>(mesh.nodes()));
+  for (std::size_t i = 0; i < split.nodes.size(); ++i) {
+    lists[static_cast<std::size_t>(split.nodes[i])].assign(split.of(i).begin(), split.of(i).end());
+  }
+  std::map<int, std::vector<int>> outgoing;  // for each shared node in turn the count and the parts
+  for (const Halo::Partner& partner : mesh.node_halo.partners()) {
+    if (partner.sends.empty()) continue;
+    std::vector<int>& message = outgoing[partner.rank];
+    for (const LocalId node : partner.sends) {
+      const std::vector<int>& list = lists[static_cast<std::size_t>(node)];
+      message.push_back(static_cast<int>(list.size()));
+      message.insert(message.end(), list.begin(), list.end());
+    }
+  }
+  const std::map<int, std::vector<int>> incoming = sparse_exchange(comm, outgoing);
+  for (const Halo::Partner& partner : mesh.node_halo.partners()) {
+    if (partner.receives.empty()) continue;
+    const int* next = incoming.at(partner.rank).data();
+    for (const LocalId node : partner.receives) {
+      const int count = *next++;
+      lists[static_cast<std::size_t>(node)].assign(next, next + count);
+      next += count;
+    }
+  }
+  AroundNodes around;
+  around.start.assign(1, 0);
+  for (const std::vector<int>& list : lists) {
+    around.parts.insert(around.parts.end(), list.begin(), list.end());
+    around.start.push_back(static_cast<std::int64_t>(around.parts.size()));
+  }
+  return around;
+}
+
 }  // namespace malleus

@@ -25,6 +25,20 @@ struct SplitNodes {
 /// parts: [element]. Collective.
 SplitNodes find_split_nodes(const Communicator& comm, const Mesh& mesh, std::span<const int> parts);
 
+/// The parts around every local node between parts, copies included; nothing at other nodes.
+struct AroundNodes {
+  std::vector<std::int64_t> start;  ///< [node + 1]
+  std::vector<int> parts;           ///< increasing for each node
+
+  std::span<const int> of(LocalId node) const {
+    const auto n = static_cast<std::size_t>(node);
+    return {parts.data() + start[n], static_cast<std::size_t>(start[n + 1] - start[n])};
+  }
+};
+
+/// Owners tell the holders of copies which parts are around their nodes. Collective.
+AroundNodes spread_split_nodes(const Communicator& comm, const Mesh& mesh, const SplitNodes& split);
+
 /// The part of every local node, copies included: [node]. Split nodes go one by one to the part around them with the
 /// least to do (elements and nodes, by speed), in sweeps. On several ranks each counts on the others doing as it does.
 /// Collective.

@@ -9,6 +9,7 @@
 
 #include "base/index.hpp"
 #include "partition/balance.hpp"
+#include "partition/interface_release.hpp"
 #include "remesh/interface_strip.hpp"
 #include "remesh/selection.hpp"
 
@@ -31,9 +32,9 @@ class DistributedRemesher {
     timed("report", [&] { report_.before = metric_fit(comm_, mesh_, metric()); });
     while (refine_in_stage()) {
     }
-    timed("balance", [&] { spread(metric(), comm_.size()); });
+    timed("balance", [&] { spread_over_all(); });
     remesh_all(options_.local);
-    remesh_strips();
+    report_.interface_nodes = remesh_strips(options_.local, options_.strip_rounds);
     timed("balance", [&] {
       balance_along_curve(comm_, mesh_, fields_);
       if (options_.balances_by_cost) balance_by_cost(comm_, mesh_, fields_, solver_work(), false);
@@ -62,18 +63,40 @@ class DistributedRemesher {
     report_.phases.push_back({name, seconds});
   }
 
-  /// Divides the mesh among the first ranks by what each element will become, each time along other cuts.
-  void spread(const Metric& wanted, int ranks) {
-    if (comm_.size() == 1) return;
-    // What an element costs even if it is only looked at or taken away, in elements to be made.
-    constexpr Real own_cost = 0.3;
+  /// Work of each element: what it will become, and what it costs even if it is only looked at or taken away.
+  std::vector<Real> predicted_work() const {
+    constexpr Real own_cost = 0.3;  // in elements to be made
+    std::vector<Real> work = predicted_elements_of_each(local_arrays(mesh_), metric());
+    for (Real& count : work) count += own_cost;
+    return work;
+  }
+
+  /// Divides the mesh among the first ranks, each time along other cuts.
+  void spread_along_curve(int ranks) {
     constexpr Real scale = 1000;
-    const std::vector<Real> predicted = predicted_elements_of_each(local_arrays(mesh_), wanted);
     std::vector<GlobalId> weights;
-    for (const Real count : predicted)
-      weights.push_back(static_cast<GlobalId>(std::clamp(scale * (count + own_cost), 1.0, 1e12)));
-    const MigrationReport moved =
-        divide_along_curve(comm_, mesh_, fields_, weights, ranks, static_cast<int>(report_.rounds.size()));
+    for (const Real work : predicted_work())
+      weights.push_back(static_cast<GlobalId>(std::clamp(scale * work, 1.0, 1e12)));
+    note(divide_along_curve(comm_, mesh_, fields_, weights, ranks, static_cast<int>(report_.rounds.size())));
+  }
+
+  /// Divides the mesh among all ranks with short borders, as their strips are remeshed twice.
+  void spread_over_all() {
+    if (comm_.size() == 1) return;
+    if (!report_.rounds.empty() || mesh_.total_elements < options_.fewest_elements * comm_.size())
+      spread_along_curve(comm_.size());
+    WorkModel model;
+    model.node = 0;
+    model.factor = predicted_work();
+    PartitionOptions options;
+    options.tolerance = 0.02;
+    options.starts_anew = true;
+    const std::vector<int> here(index(mesh_.elements()), comm_.rank());
+    const PartitionPlan plan = make_partition(comm_, mesh_, model, equal_architecture(comm_.size()), options, here);
+    note(migrate(comm_, mesh_, fields_, plan.parts));
+  }
+
+  void note(const MigrationReport& moved) {
     moved_ += moved.moved_elements;
     sent_ += moved.sent_bytes;
   }
@@ -87,7 +110,7 @@ class DistributedRemesher {
     const Real growth = ranks < comm_.size() ? growth_of_all() : growth_at_interfaces();
     const Real stages = std::ceil(std::log(std::max(growth, 1.0)) / std::log(largest_growth));
     if (stages <= 1) return false;
-    timed("balance", [&] { spread(metric(), static_cast<int>(ranks)); });
+    timed("balance", [&] { spread_along_curve(static_cast<int>(ranks)); });
     remesh_coarser(std::pow(growth, (1 - 1 / stages) / mesh_.dim));
     return true;
   }
@@ -110,11 +133,13 @@ class DistributedRemesher {
     return sums[1] > 0 ? sums[0] / sums[1] : 1;
   }
 
+  /// The first time all ranks get as much of the strips; the little that is then left is drawn for.
   void leave_interfaces(const std::vector<std::uint8_t>& marks, int round) {
-    const MigrationReport moved =
-        migrate(comm_, mesh_, fields_, move_interfaces(comm_, mesh_, marks, options_.moved_layers, round));
-    moved_ += moved.moved_elements;
-    sent_ += moved.sent_bytes;
+    ReleaseOptions release;
+    release.aim = round == 0 ? ReleaseAim::equal_strips : ReleaseAim::most_released;
+    release.layers = options_.moved_layers;
+    release.round = round;
+    note(migrate(comm_, mesh_, fields_, move_interfaces_inside(comm_, mesh_, predicted_work(), release, marks).parts));
   }
 
   /// Remeshes with sizes that are larger than wanted by up to a factor, but no larger than now.
@@ -138,6 +163,8 @@ class DistributedRemesher {
     quick.improvement_rounds = std::min(quick.improvement_rounds, 2);
     quick.keep_volume = false;
     remesh_all(quick);
+    // Interfaces of the next stage cross these: what is held in bad shape would spoil what lies around it.
+    remesh_strips(quick, 1);
     restore_wanted(was_uniform);
   }
 
@@ -198,23 +225,24 @@ class DistributedRemesher {
     report_.volume_error = std::max(report_.volume_error, local.volume_error);
   }
 
-  void remesh_strips() {
+  /// Returns the number of nodes about which interfaces never moved away.
+  GlobalId remesh_strips(const RemeshOptions& options, int rounds) {
     // Marks follow the mesh as a field: on nodes that interfaces held in the last remesh.
     fields_.declare(mesh_, {mark_field_name, "1", Support::node, 1});
     std::vector<std::uint8_t> marks = shared_nodes(mesh_);
-    for (int round = 0; round < options_.strip_rounds && comm_.any(is_any(marks)); ++round) {
+    for (int round = 0; round < rounds && comm_.any(is_any(marks)); ++round) {
       timed("move interfaces", [&] {
         set_marks(marks);
         leave_interfaces(marks, round);
       });
-      timed("remesh strips", [&] { marks = remesh_strip(); });
+      timed("remesh strips", [&] { marks = remesh_strip(options); });
     }
     fields_.remove(mark_field_name);
-    report_.interface_nodes = comm_.sum(static_cast<GlobalId>(std::count(marks.begin(), marks.end(), 1)));
+    return comm_.sum(static_cast<GlobalId>(std::count(marks.begin(), marks.end(), 1)));
   }
 
   /// Remeshes about the marked nodes; returns those that were held by an interface again, in the new mesh.
-  std::vector<std::uint8_t> remesh_strip() {
+  std::vector<std::uint8_t> remesh_strip(const RemeshOptions& options) {
     const std::vector<int> distance = layers_from(comm_, mesh_, get_marks(), options_.strip_layers);
     std::vector<std::uint8_t> selected(index(mesh_.elements()), 0);
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
@@ -227,7 +255,7 @@ class DistributedRemesher {
     for (std::size_t node = 0; node < held.size(); ++node)
       held[node] = shared[node] != 0 && distance[node] == 0 ? 1 : 0;
     set_marks(held);
-    remesh(selected, options_.local);
+    remesh(selected, options);
     // Marks of new nodes are interpolated: what was held keeps exactly 1 and its place among the shared nodes.
     std::vector<std::uint8_t> marks = get_marks();
     const std::vector<std::uint8_t> shared_now = shared_nodes(mesh_);

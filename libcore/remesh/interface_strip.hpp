@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a parallel remesh left undone lies along the former interfaces: where that is, and how it comes to lie inside.
+/// What a parallel remesh left undone lies along the former interfaces: where that is.
 
 #include <vector>
 
@@ -12,11 +12,5 @@ namespace malleus {
 /// on all holders of a node. marks: [node], alike or not. Collective.
 std::vector<int> layers_from(const Communicator& comm, const Mesh& mesh, const std::vector<std::uint8_t>& marks,
                              int layers);
-
-/// A rank for each element such that interfaces at marked nodes move away from them: of the ranks that meet at a
-/// marked node one, drawn from `round`, takes over the elements up to `layers` around it; where several would, the
-/// nearest, then the one drawn first. Other elements stay. Collective.
-std::vector<int> move_interfaces(const Communicator& comm, const Mesh& mesh, const std::vector<std::uint8_t>& marks,
-                                 int layers, int round);
 
 }  // namespace malleus

@@ -204,17 +204,43 @@ TEST_P(Partitions, BordersMoveInside) {
   const PartitionPlan plan = make_partition(world(), mesh, {}, machine, {});
   const std::vector<Real> work(static_cast<std::size_t>(mesh.elements()), 1);
   ReleaseOptions options;
-  options.balanced = false;
+  options.aim = ReleaseAim::most_released;
   const Release shifted = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options);
   expect_parts(mesh, shifted.parts, 4);
   EXPECT_GT(shifted.interface_nodes, 0);
   EXPECT_LE(shifted.still, shifted.interface_nodes / 5);
   EXPECT_LT(shifted.moved_elements, mesh.total_elements / 2);
-  options.balanced = true;
+  options.aim = ReleaseAim::equal_loads;
   const Release balanced = move_interfaces_inside(world(), mesh, work, machine, plan.parts, options);
   EXPECT_LE(balanced.imbalance, 0.1);
   EXPECT_LE(balanced.still, balanced.interface_nodes / 2);
   expect_parts(mesh, move_interfaces_inside(world(), mesh, work, options).parts, world().size());
+}
+
+/// Two parts, one border: half of the strip goes to each, on the old border only the line between the halves stays.
+TEST_P(Partitions, StripsAlongBordersAreSharedOut) {
+  const int cells = GetParam() == 2 ? 40 : 12;
+  const Mesh mesh = box(GetParam(), cells);
+  std::vector<int> halves;
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    Real x = 0;
+    for (const LocalId node : mesh.nodes_of_element(e)) x += mesh.point(node)[0] / (mesh.dim + 1);
+    halves.push_back(x < 1 ? 0 : 1);
+  }
+  const std::vector<Real> work(static_cast<std::size_t>(mesh.elements()), 1);
+  ReleaseOptions options;
+  options.aim = ReleaseAim::equal_strips;
+  options.layers = 3;
+  const Release release = move_interfaces_inside(world(), mesh, work, equal_architecture(2), halves, options);
+  std::array<GlobalId, 2> taken = {0, 0};
+  for (std::size_t e = 0; e < halves.size(); ++e) {
+    if (release.parts[e] != halves[e]) ++taken[static_cast<std::size_t>(release.parts[e])];
+  }
+  world().sum_in_place(taken);
+  EXPECT_GT(taken[0], 0);
+  EXPECT_NEAR(static_cast<Real>(taken[0]), static_cast<Real>(taken[1]), 0.2 * static_cast<Real>(taken[0]));
+  EXPECT_LE(release.still, release.interface_nodes / (GetParam() == 2 ? 10 : 4));
+  EXPECT_LT(release.imbalance, 0.05);
 }
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, Partitions, testing::Values(2, 3));

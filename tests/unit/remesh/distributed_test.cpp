@@ -7,9 +7,9 @@
 
 #include "mesh/statistics.hpp"
 #include "mesh/verify.hpp"
+#include "partition/interface_release.hpp"
 #include "partition/migrate.hpp"
 #include "remesh/error_metric.hpp"
-#include "remesh/interface_strip.hpp"
 #include "remesh/selection.hpp"
 #include "remesh/subdivide.hpp"
 #include "support/box_mesh.hpp"
@@ -187,7 +187,11 @@ TEST_P(Distributed, InterfacesMoveAwayFromMarks) {
   Field& mark = scene.fields.declare(scene.mesh, {"mark", "1", Support::node, 1});
   mark.assign({marks.begin(), marks.end()});
   const auto count = static_cast<GlobalId>(std::count(marks.begin(), marks.end(), 1));
-  migrate(world(), scene.mesh, scene.fields, move_interfaces(world(), scene.mesh, marks, 2, 0));
+  const std::vector<Real> work(static_cast<std::size_t>(scene.mesh.elements()), 1);
+  ReleaseOptions options;
+  options.aim = ReleaseAim::most_released;
+  options.layers = 2;
+  migrate(world(), scene.mesh, scene.fields, move_interfaces_inside(world(), scene.mesh, work, options, marks).parts);
   GlobalId left = 0;
   const std::vector<std::uint8_t> shared = shared_nodes(scene.mesh);
   for (LocalId node = 0; node < scene.mesh.nodes(); ++node)
