@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "mesh/faces.hpp"
+#include "mesh/node_owners.hpp"
 #include "mesh/simplex.hpp"
 #include "mesh/space_filling_curve.hpp"
 #include "parallel/agreement.hpp"
@@ -20,6 +21,7 @@ namespace {
 struct Sharing {
   std::vector<LocalId> nodes;             ///< increasing
   std::vector<std::vector<int>> holders;  ///< of each: the ranks that hold it, this one among them, increasing
+  std::vector<int> owners;                ///< of each
 };
 
 LocalId& at(std::vector<LocalId>& list, LocalId i) {
@@ -147,9 +149,27 @@ Sharing find_sharing(const Communicator& comm, const MeshPiece& piece, std::span
   return sharing;
 }
 
-/// Owner of a shared node: its lowest holder.
-int owner_among(const std::vector<int>& holders) {
-  return holders.front();
+/// Gives the shared nodes their owners, in stretches of the order in which the elements touch them.
+void set_owners(const Communicator& comm, const MeshPiece& piece, std::span<const LocalId> element_nodes,
+                Sharing& sharing) {
+  constexpr LocalId alone = -1;
+  std::vector<LocalId> place(static_cast<std::size_t>(piece.nodes()), alone);
+  for (std::size_t i = 0; i < sharing.nodes.size(); ++i) at(place, sharing.nodes[i]) = static_cast<LocalId>(i);
+  SharedNodes shared;
+  std::vector<std::size_t> order;
+  for (const LocalId node : element_nodes) {
+    if (at(place, node) == alone) continue;
+    const auto i = static_cast<std::size_t>(at(place, node));
+    at(place, node) = alone;
+    order.push_back(i);
+    shared.numbers.push_back(piece.node_numbers[static_cast<std::size_t>(node)]);
+    shared.holders.push_back(sharing.holders[i]);
+  }
+  const Real load = static_cast<Real>(piece.nodes()) - static_cast<Real>(sharing.nodes.size()) +
+                    static_cast<Real>(piece.elements()) / node_work_in_elements;
+  const std::vector<int> owners = choose_node_owners(comm, shared, load);
+  sharing.owners.resize(sharing.nodes.size());
+  for (std::size_t n = 0; n < order.size(); ++n) sharing.owners[order[n]] = owners[n];
 }
 
 /// The node numbers of the mesh under construction.
@@ -168,7 +188,7 @@ std::vector<std::pair<GlobalId, LocalId>> numbers_of_copies(const Communicator& 
   for (std::size_t i = 0; i < sharing.nodes.size(); ++i) {
     const LocalId node = sharing.nodes[i];
     const GlobalId old_number = piece.node_numbers[static_cast<std::size_t>(node)];
-    if (owner_among(sharing.holders[i]) != comm.rank()) {
+    if (sharing.owners[i] != comm.rank()) {
       old_to_piece.emplace_back(old_number, node);
       continue;
     }
@@ -200,7 +220,7 @@ Numbering number_nodes(const Communicator& comm, const MeshPiece& piece, std::sp
   Numbering numbering;
   numbering.node_of_piece.assign(static_cast<std::size_t>(piece.nodes()), unseen);
   for (std::size_t i = 0; i < sharing.nodes.size(); ++i) {
-    if (owner_among(sharing.holders[i]) != comm.rank()) at(numbering.node_of_piece, sharing.nodes[i]) = elsewhere;
+    if (sharing.owners[i] != comm.rank()) at(numbering.node_of_piece, sharing.nodes[i]) = elsewhere;
   }
   for (const LocalId node : element_nodes) {
     if (at(numbering.node_of_piece, node) != unseen) continue;
@@ -381,7 +401,8 @@ AssembledMesh assemble_mesh(const Communicator& comm, const MeshPiece& piece) {
   std::vector<LocalId> element_nodes = ordered_elements(piece, order);
   std::vector<LocalId> neighbours;
   agree(comm, [&] { neighbours = element_neighbours(piece.dim, piece.nodes(), element_nodes); });
-  const Sharing sharing = find_sharing(comm, piece, element_nodes, neighbours);
+  Sharing sharing = find_sharing(comm, piece, element_nodes, neighbours);
+  set_owners(comm, piece, element_nodes, sharing);
   Numbering numbering = number_nodes(comm, piece, element_nodes, sharing);
 
   AssembledMesh assembled;

@@ -46,7 +46,7 @@ struct Histogram {
 
   static std::size_t bin_of(const Border& border, const Real* point) {
     const auto axis = static_cast<std::size_t>(border.axis);
-    const Real place = (point[axis] - border.lowest[axis]) / (border.highest[axis] - border.lowest[axis]);
+    const Real place = (point[axis] - border.lowest[axis]) / border.extent();
     return std::min(bins - 1, static_cast<std::size_t>(std::max(0.0, place * static_cast<Real>(bins))));
   }
 };
@@ -126,7 +126,7 @@ void BorderShares::divide(std::vector<Real>& measures, Real slack) {
     for (auto& [pair, border] : borders_) {
       Real& low = measures[static_cast<std::size_t>(pair.first)];
       Real& high = measures[static_cast<std::size_t>(pair.second)];
-      if (std::abs(high - low) <= slack || border.work() <= 0) continue;
+      if (std::abs(high - low) <= slack || border.work() <= 0 || !(border.extent() > 0)) continue;
       const Real share = std::clamp(border.share + 0.5 * (high - low) / border.work(), 0.0, 1.0);
       const Real change = (share - border.share) * border.work();
       if (std::abs(change) < 0.25 * slack) continue;

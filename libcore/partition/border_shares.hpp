@@ -25,6 +25,8 @@ struct Border {
   Real cut = 0;                             ///< the lower part takes over at nodes below this coordinate
 
   Real work() const { return from_low + from_high; }
+  /// Along its axis, m; a border that is a single point cannot be divided.
+  Real extent() const { return highest[static_cast<std::size_t>(axis)] - lowest[static_cast<std::size_t>(axis)]; }
 };
 
 class BorderShares {

@@ -6,6 +6,7 @@
 
 #include "base/error.hpp"
 #include "mesh/faces.hpp"
+#include "mesh/node_owners.hpp"
 #include "mesh/number_table.hpp"
 #include "parallel/sparse_exchange.hpp"
 
@@ -107,7 +108,7 @@ void set_centres(const Mesh& mesh, WorkGraph& graph) {
 
 WorkModel solver_work() {
   WorkModel model;
-  model.node = 16;
+  model.node = node_work_in_elements;
   return model;
 }
 

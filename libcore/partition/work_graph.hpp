@@ -19,8 +19,7 @@ struct WorkModel {
   std::vector<Real> factor;  ///< [element] relative work of each, >= 0; empty = 1. Scaled so that the total stays.
 };
 
-/// The work of this program's own solver, for sharing out its runs: on the housing case (31 289 nodes, 113 282
-/// elements, one rank) assembly took 2.5 us an element, set-up and solve 39 us a node. WorkModel's defaults are the
+/// The work of this program's own solver, for sharing out its runs (mesh/node_owners.hpp). WorkModel's defaults are the
 /// ratio of the paper's times (its table 2), with a less able preconditioner.
 WorkModel solver_work();
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "base/error.hpp"
+#include "mesh/node_owners.hpp"
 #include "mesh/simplex.hpp"
 #include "support/box_mesh.hpp"
 #include "support/world.hpp"
@@ -117,6 +118,21 @@ TEST_P(AssembledBox, MoreRanksThanCellsLeavesEmptyRanks) {
   const Mesh mesh = box_mesh(world(), box);
   EXPECT_EQ(mesh.total_nodes(), mesh.dim == 3 ? 8 : 4);
   EXPECT_NEAR(total_volume(mesh), 1.0, 1e-14);
+}
+
+/// Cubes side by side, a slab each: nodes between two ranks are not all the lower one's.
+TEST_P(AssembledBox, NodesBetweenRanksAreSharedOut) {
+  BoxMeshOptions box = options();
+  box.cells = {12, 6, 6};
+  const Mesh mesh = box_mesh(world(), box);
+  const Real load = static_cast<Real>(mesh.owned_nodes()) + static_cast<Real>(mesh.elements()) / node_work_in_elements;
+  const Real mean = world().sum(load) / world().size();
+  EXPECT_LE(world().max(load), 1.03 * mean + 1);
+  GlobalId elsewhere = 0;  // copies whose owner is a higher rank
+  for (const GlobalId number : mesh.copy_numbers) elsewhere += mesh.node_ownership.owner_of(number) > world().rank();
+  if (world().size() > 1) {
+    EXPECT_GT(world().sum(elsewhere), 0);
+  }
 }
 
 TEST_P(AssembledBox, AFaceOfThreeElementsIsRefused) {
