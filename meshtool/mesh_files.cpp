@@ -60,9 +60,9 @@ void refuse_unknown_ending(const std::string& path) {
   throw InputError(fmt::format("{}: a mesh file ends in {}", path, mesh_endings()));
 }
 
-Mesh read_mesh(const Communicator& comm, const std::string& path, Real length_unit, FieldStore& fields) {
+Mesh read_mesh(const Communicator& comm, const std::string& path, Real length_unit, FieldStore& fields, Folds folds) {
   refuse_unknown_ending(path);
-  return load_mesh(comm, path, length_unit, fields);
+  return load_mesh(comm, path, length_unit, fields, folds);
 }
 
 MeshChunk read_chunk(const Communicator& comm, const std::string& path, Real length_unit) {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "engine/load_mesh.hpp"
 #include "field/field.hpp"
 #include "mesh/distribute.hpp"
 #include "mesh/msh_writer.hpp"
@@ -18,7 +19,8 @@ void refuse_unknown_ending(const std::string& path);
 
 /// Reads a mesh, and the fields of a file that has some. length_unit: metres per unit of length in the file.
 /// InputError. Collective.
-Mesh read_mesh(const Communicator& comm, const std::string& path, Real length_unit, FieldStore& fields);
+Mesh read_mesh(const Communicator& comm, const std::string& path, Real length_unit, FieldStore& fields,
+               Folds folds = Folds::refuse);
 
 /// Reads a mesh as it stands in the file, in loose pieces, without fields. InputError. Collective.
 MeshChunk read_chunk(const Communicator& comm, const std::string& path, Real length_unit);

@@ -124,8 +124,9 @@ int run_refine(const Communicator& comm, const std::vector<std::string>& argumen
   FieldStore fields;
   std::vector<GlobalId> numbers;
   const Real start = MPI_Wtime();
-  Mesh mesh = options.metric.empty() ? read_mesh(comm, options.input, options.length_unit, fields)
-                                     : build_mesh(comm, read_chunk(comm, options.input, options.length_unit), &numbers);
+  Mesh mesh = options.metric.empty()
+                  ? read_mesh(comm, options.input, options.length_unit, fields, Folds::keep_for_repair)
+                  : build_mesh(comm, read_chunk(comm, options.input, options.length_unit), &numbers);
   const Real read = MPI_Wtime();
   const DistributedRemeshReport report =
       options.uniform > 0 ? halve(comm, mesh, fields, options.uniform) : remesh(comm, mesh, fields, numbers, options);

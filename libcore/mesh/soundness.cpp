@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mesh/face_census.hpp"
+#include "mesh/faces.hpp"
 #include "mesh/proximity.hpp"
 #include "mesh/simplex.hpp"
 #include "mesh/space_filling_curve.hpp"
@@ -66,6 +67,59 @@ GlobalId count_flat(const MeshPiece& piece) {
   });
 }
 
+/// Signed volume of an element [m^dim].
+Real signed_volume(const MeshPiece& piece, LocalId e) {
+  return with_dim(piece.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    SimplexPoints<D> points;
+    for (int i = 0; i <= D; ++i) {
+      const LocalId node = piece.element_nodes[static_cast<std::size_t>(e * (D + 1) + i)];
+      points.col(i) = Eigen::Map<const Point<D>>(piece.coordinates.data() + static_cast<std::size_t>(node) * D);
+    }
+    return simplex_volume<D>(points);
+  });
+}
+
+/// Whether the order of a face's nodes is an odd permutation of the increasing one.
+bool is_odd(std::span<const GlobalId> nodes) {
+  bool odd = false;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t j = i + 1; j < nodes.size(); ++j) odd = odd != (nodes[i] > nodes[j]);
+  }
+  return odd;
+}
+
+/// Faces whose two elements lie on the same side of them once all elements are turned to positive volume: there the
+/// mesh is folded over. Both see such a face in the same sense, others see theirs in opposite ones.
+/// elements_of_face: [element][face].
+GlobalId count_folds(const Communicator& comm, const MeshPiece& piece, std::span<const GlobalId> element_nodes,
+                     std::span<const std::int32_t> elements_of_face) {
+  const auto corners = static_cast<std::size_t>(piece.dim) + 1;
+  std::vector<FaceNumbers> oriented;
+  oriented.reserve(element_nodes.size());
+  for (LocalId e = 0; e < piece.elements(); ++e) {
+    const bool is_turned = signed_volume(piece, e) < 0;
+    for (int f = 0; f <= piece.dim; ++f) {
+      std::array<GlobalId, 3> nodes = {};
+      for (int k = 0; k < piece.dim; ++k) {
+        nodes[static_cast<std::size_t>(k)] =
+            element_nodes[static_cast<std::size_t>(e) * corners + static_cast<std::size_t>(face_node(piece.dim, f, k))];
+      }
+      const std::span<const GlobalId> face(nodes.data(), static_cast<std::size_t>(piece.dim));
+      const bool sense = is_odd(face) != is_turned;
+      FaceNumbers numbers = face_numbers(face);
+      numbers[2] = 2 * numbers[2] + (sense ? 1 : 0);
+      oriented.push_back(numbers);
+    }
+  }
+  const std::vector<std::int32_t> alike = count_equal_faces(comm, oriented);
+  Real folds = 0;
+  for (std::size_t slot = 0; slot < alike.size(); ++slot) {
+    if (alike[slot] == 2 && elements_of_face[slot] == 2) folds += 0.5;
+  }
+  return std::llround(comm.sum(folds));
+}
+
 std::vector<GlobalId> numbers_of(const MeshPiece& piece, std::span<const LocalId> nodes) {
   std::vector<GlobalId> numbers;
   numbers.reserve(nodes.size());
@@ -93,7 +147,8 @@ GlobalId count_branching(const Communicator& comm, int dim, std::span<const Face
 }
 
 void add_face_problems(const Communicator& comm, const MeshPiece& piece, ProblemList& problems) {
-  const std::vector<FaceNumbers> faces = faces_of_elements(piece.dim, numbers_of(piece, piece.element_nodes));
+  const std::vector<GlobalId> element_numbers = numbers_of(piece, piece.element_nodes);
+  const std::vector<FaceNumbers> faces = faces_of_elements(piece.dim, element_numbers);
   const std::vector<std::int32_t> elements_of_face = count_equal_faces(comm, faces);
   std::vector<char> is_exterior(faces.size(), 0);
   std::vector<FaceNumbers> exterior;
@@ -106,6 +161,8 @@ void add_face_problems(const Communicator& comm, const MeshPiece& piece, Problem
   }
   problems.add(std::llround(comm.sum(crowded)), "crowded faces",
                "faces belong to more than two elements: the mesh is not manifold");
+  problems.add(count_folds(comm, piece, element_numbers, elements_of_face), "folds",
+               "faces have both their elements on the same side: the mesh is folded over (meshtool refine repairs it)");
   problems.add(count_branching(comm, piece.dim, exterior), "branching boundary",
                piece.dim == 3 ? "edges have more than two boundary faces: the boundary is not manifold"
                               : "nodes have more than two boundary edges: the boundary is not manifold");

@@ -19,7 +19,8 @@ struct MeshProblem {
 
 /// All problems of a mesh as it was read, before it is assembled; the same on all ranks. Looked for: node numbers given
 /// twice, unused nodes, coincident nodes of one region, elements given twice, inverted and flat elements, facets given
-/// twice or of no element, faces of more than two elements, boundary edges (in 2D nodes) at which more than two
+/// twice or of no element, faces of more than two elements, folds (two elements on
+/// the same side of their face), boundary edges (in 2D nodes) at which more than two
 /// boundary facets meet, hanging nodes, boundary facets without a group. Lengths in m. Collective.
 std::vector<MeshProblem> find_problems(const Communicator& comm, const DistributedPiece& distributed);
 

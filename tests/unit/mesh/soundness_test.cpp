@@ -47,6 +47,21 @@ TEST_P(Soundness, ASoundMeshHasNoProblem) {
   EXPECT_EQ(problems_of(box_chunk(small_box(GetParam()))), Counts{});
 }
 
+/// A corner of one element carried through its opposite face and beyond: no order of nodes can mend that.
+TEST_P(Soundness, FoldsAreCounted) {
+  MeshChunk chunk = box_chunk(small_box(GetParam()));
+  const auto dim = static_cast<std::size_t>(chunk.dim);
+  // Nodes off the lower faces go to the other side of the plane x = 0.
+  for (std::size_t node = 0; node < chunk.node_numbers.size(); ++node) {
+    bool is_inside = true;
+    for (std::size_t c = 0; c < dim; ++c) {
+      is_inside = is_inside && chunk.coordinates[node * dim + c] > 1e-9;
+    }
+    if (is_inside) chunk.coordinates[node * dim] = -chunk.coordinates[node * dim];
+  }
+  EXPECT_GT(problems_of(std::move(chunk))["folds"], 0);
+}
+
 TEST_P(Soundness, UntaggedBoundaryIsCounted) {
   MeshChunk chunk = box_chunk(small_box(GetParam()));
   chunk.facet_nodes.clear();
