@@ -77,8 +77,27 @@ void ContactFlow::roll_back() {
   scene_.progress.was_pushed = saved_.was_pushed;
 }
 
+std::vector<Real> ContactFlow::save_memory() const {
+  std::vector<Real> saved;
+  for (const ContactMemory& memory : memory_) {
+    saved.insert(saved.end(), {static_cast<Real>(memory.slave), static_cast<Real>(memory.opponent), memory.normal[0],
+                               memory.normal[1], memory.normal[2], memory.multiplier, memory.pressure});
+  }
+  return saved;
+}
+
+void ContactFlow::restore_memory(std::span<const Real> saved) {
+  constexpr std::size_t numbers = 7;
+  memory_.clear();
+  for (std::size_t i = 0; i + numbers <= saved.size(); i += numbers) {
+    memory_.push_back({static_cast<LocalId>(saved[i]), static_cast<int>(saved[i + 1]),
+                       Vector(saved[i + 2], saved[i + 3], saved[i + 4]), saved[i + 5], saved[i + 6]});
+  }
+}
+
 Outcome ContactFlow::advance(const Increment& increment) {
   save();
+  linear_.reset();  // what is kept from the increment before would not be there after a restart
   report_ = {};
   tries_ = increment.number == tried_increment_ ? tries_ + 1 : 1;
   tried_increment_ = increment.number;

@@ -70,6 +70,9 @@ class ContactFlow final : public Component {
   /// The largest rate at which an edge or an element of the last solution strains, 1/s; 0 before the first.
   Real largest_edge_rate() const noexcept { return edge_rate_; }
   Real largest_strain_rate() const noexcept { return strain_rate_; }
+  /// What the last solve left at the contact points, as numbers, and back after a restart on as many ranks. Local.
+  std::vector<Real> save_memory() const;
+  void restore_memory(std::span<const Real> saved);
   void set_rates(Real edge_rate, Real strain_rate) {  ///< after a restart
     edge_rate_ = edge_rate;
     strain_rate_ = strain_rate;

@@ -40,6 +40,8 @@ class ForgeProcess final : public Process {
   nlohmann::json accuracy() override;
   std::vector<std::string> closing_lines() override;
   nlohmann::json save_state() const override;
+  std::vector<Real> save_local() const override { return flow_.save_memory(); }
+  void restore_local(std::span<const Real> saved) override { flow_.restore_memory(saved); }
   void restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
                const nlohmann::json& state) override;
 

@@ -318,6 +318,31 @@ void Flow::load(const nlohmann::json& saved) {
   scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
 }
 
+std::vector<Real> Flow::save_local() const {
+  std::vector<Real> saved = unknowns_.nodes;
+  for (const std::span<const Real> values :
+       {operator_->viscosity(), operator_->shear_rate(), std::span<const Real>(scene_.subscale_velocity)}) {
+    saved.insert(saved.end(), values.begin(), values.end());
+  }
+  return saved;
+}
+
+void Flow::load_local(std::span<const Real> saved) {
+  const auto take = [&](std::size_t count) {
+    check(count <= saved.size(), "a saved flow fits its mesh");
+    const std::span<const Real> taken = saved.first(count);
+    saved = saved.subspan(count);
+    return taken;
+  };
+  const std::size_t elements = operator_->viscosity().size();
+  const std::span<const Real> nodes = take(unknowns_.nodes.size());
+  unknowns_.nodes.assign(nodes.begin(), nodes.end());
+  const std::span<const Real> viscosity = take(elements);
+  operator_->restore_viscosity(viscosity, take(elements));
+  const std::span<const Real> subscales = take(scene_.subscale_velocity.size());
+  scene_.subscale_velocity.assign(subscales.begin(), subscales.end());
+}
+
 PrescribedFlow::PrescribedFlow(Scene& scene, FillingState& state) : scene_(scene), state_(state) {
   state_.gates.resize(scene.settings.inlets.size());
   scene_.fields.declare(scene_.mesh, velocity_spec(scene_.mesh.dim));

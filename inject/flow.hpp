@@ -39,6 +39,9 @@ class Flow final : public Component {
   Real freezing_error() const { return freezing_error_; }
   nlohmann::json save() const;
   void load(const nlohmann::json& saved);
+  /// What the last solve left, which may be some increments old: to go on from it with the same digits. Local.
+  std::vector<Real> save_local() const;
+  void load_local(std::span<const Real> saved);
 
   /// Throws InputError where the conditions at t = 0 cannot be met: before anything is written. Collective.
   void check_conditions();

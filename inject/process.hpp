@@ -52,6 +52,10 @@ class FillingProcess final : public Process {
   nlohmann::json accuracy() override;
   std::vector<std::string> closing_lines() override;
   nlohmann::json save_state() const override;
+  std::vector<Real> save_local() const override { return flow_ ? flow_->save_local() : std::vector<Real>(); }
+  void restore_local(std::span<const Real> saved) override {
+    if (flow_) flow_->load_local(saved);
+  }
   void restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
                const nlohmann::json& state) override;
   Probes* probes() override { return probes_ ? probes_.get() : nullptr; }

@@ -147,7 +147,7 @@ KeyOf<T> Section::custom(std::string_view name, Member& member, const Converter<
     if constexpr (std::is_same_v<T, Expression>) value.set_source(key.source);
     member = std::move(value);
   };
-  key.print = [&member, &key, write = converter.write]() -> std::string {
+  key.print = [&, write = converter.write]() -> std::string {
     if constexpr (detail::IsOptional<Member>::value) {
       return member ? write(*member) : key.empty_word;
     } else {

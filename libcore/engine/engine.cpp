@@ -12,6 +12,7 @@
 #include "engine/report.hpp"
 #include "engine/resources.hpp"
 #include "parallel/agreement.hpp"
+#include "parallel/fault.hpp"
 #include "partition/balance.hpp"
 #include "storage/atomic_file.hpp"
 
@@ -21,7 +22,9 @@ namespace {
 constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes take more than seconds to make coarser
 constexpr int most_cuts = 12;                      ///< of one increment's step, each to a half
 constexpr Real growth_after_cut = 1.5;             ///< of the step from one increment to the next
-constexpr Real wall_time_margin = 1.3;  ///< times the longest checkpoint, kept free before the wall time ends
+/// Times the last increment and the longest checkpoint, kept free before the wall time ends.
+constexpr Real wall_time_margin = 1.3;
+constexpr Real first_checkpoint_in_outputs = 2;  ///< time of a checkpoint before there was one, in outputs of fields
 
 /// Equal shares of a state that was read on another number of ranks than wrote it.
 void balance_saved(const Communicator& comm, SavedState& saved) {
@@ -59,6 +62,7 @@ auto Engine::timed(const std::string& name, Work work) {
       timing.wall_s += wall_clock() - began;
     }
   } stopwatch{timing(name)};
+  pass_fault_point(name);
   return work();
 }
 
@@ -133,6 +137,10 @@ void Engine::start_anew() {
     write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);
   });
   report::print_heading(process_, settings_, comm_);
+  if (const Forecast forecast = process_.forecast(); forecast.memory_bytes > settings_.memory_limit_bytes) {
+    log::warning("[limits] memory: the forecast is {:.0f} MiB over all ranks, {:.0f} MiB are allowed",
+                 forecast.memory_bytes / 1048576, settings_.memory_limit_bytes / 1048576);
+  }
   checkpoints_.remove_all();
   results_.start_anew();
   std::vector<std::string> columns = engine_columns();
@@ -148,30 +156,44 @@ bool Engine::try_restart() {
   std::optional<SavedState> saved = checkpoints_.read_newest();
   if (!saved) return false;
   if (saved->is_dealt_anew) balance_saved(comm_, *saved);
-  on_root(comm_, [&] {
-    log::open_file(settings_.directory / "run.log", true);
-    write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);
-  });
-  const nlohmann::json& state = saved->state.at("engine");
-  last_ = {state.at("increment"), state.at("time"), state.at("dt")};
-  next_dt_limit_ = state.at("dt_limit").is_null() ? std::numeric_limits<Real>::infinity() : Real(state.at("dt_limit"));
-  wall_of_earlier_legs_ = state.at("wall_s");
-  first_increment_ = last_.number;
-  last_checkpoint_ = last_.number;
-  last_output_ = state.at("last_output");
-  space_estimate_.restore(state.at("space_estimate"));
-  is_estimated_halfway_ = state.at("is_estimated_halfway");
-  process_.restore(std::move(saved->mesh), std::move(saved->fields), saved->state.at("process"));
-  results_.resume_after(last_.number);
-  if (Probes* probes = process_.probes()) {
-    probes->set_places(state.at("probes").get<std::vector<std::vector<Real>>>());
-    probes->resume(settings_.directory, process_.fields(), last_.time);
+  try {
+    restore(std::move(*saved));
+  } catch (const nlohmann::json::exception& error) {  // the state is the same on all ranks
+    throw InputError(fmt::format("--restart: the state in {} is not of this case, or of another version ({})",
+                                 (settings_.directory / "checkpoints").string(), error.what()));
   }
   std::vector<std::string> columns = engine_columns();
   for (std::string& name : process_.history_columns()) columns.push_back(std::move(name));
   history_ = History::resumed(comm_, settings_.directory / "history.csv", columns, last_.number);
+  on_root(comm_, [&] {
+    log::open_file(settings_.directory / "run.log", true);
+    write_file_atomically(settings_.directory / "case.resolved.ini", settings_.resolved_case);
+  });
+  results_.resume_after(last_.number);
+  if (Probes* probes = process_.probes()) probes->resume(settings_.directory, process_.fields(), last_.time);
   log::info("restarted after increment {} at {:.6g} s", last_.number, last_.time);
   return true;
+}
+
+void Engine::restore(SavedState&& saved) {
+  const nlohmann::json& state = saved.state.at("engine");
+  if (const std::string program = state.at("program"); program != settings_.program) {
+    throw InputError(fmt::format("--restart: the state in {} is of {}, not of {}",
+                                 (settings_.directory / "checkpoints").string(), program, settings_.program));
+  }
+  last_ = {state.at("increment"), state.at("time"), state.at("dt")};
+  next_dt_limit_ = state.at("dt_limit").is_null() ? std::numeric_limits<Real>::infinity() : Real(state.at("dt_limit"));
+  wall_of_earlier_legs_ = state.at("wall_s");
+  longest_checkpoint_s_ = state.at("longest_checkpoint_s");
+  first_increment_ = last_.number;
+  last_checkpoint_ = last_.number;
+  last_checkpoint_wall_ = wall_s();
+  last_output_ = state.at("last_output");
+  space_estimate_.restore(state.at("space_estimate"));
+  is_estimated_halfway_ = state.at("is_estimated_halfway");
+  if (Probes* probes = process_.probes()) probes->set_places(state.at("probes").get<std::vector<std::vector<Real>>>());
+  process_.restore(std::move(saved.mesh), std::move(saved.fields), saved.state.at("process"));
+  if (!saved.is_dealt_anew) process_.restore_local(saved.local);
 }
 
 int Engine::solve_once() {
@@ -196,19 +218,22 @@ int Engine::run_increments() {
   while (!is_over()) {
     if (const std::string reason = reason_to_stop(); !reason.empty()) {
       end_reason_ = reason;
-      if (last_checkpoint_ != last_.number || last_.number == 0) write_checkpoint();
+      write_checkpoint_if_new();
       finish("stopped", exit_code::checkpointed);
       return exit_code::checkpointed;
     }
-    if (const auto failure = make_increment()) {
+    const Real began = wall_clock();
+    const auto failure = make_increment();
+    last_increment_s_ = wall_clock() - began;
+    if (failure) {
       end_reason_ = *failure;
-      if (last_checkpoint_ != last_.number) write_checkpoint();
+      write_checkpoint_if_new();
       finish("failed", exit_code::numerics);
       return exit_code::numerics;
     }
     if (checkpoint_is_due()) write_checkpoint();
   }
-  if (last_checkpoint_ != last_.number) write_checkpoint();  // --restart goes on from it, as may another case
+  write_checkpoint_if_new();  // --restart goes on from it, as may another case
   finish("done", exit_code::done);
   return exit_code::done;
 }
@@ -338,7 +363,7 @@ void Engine::write_fields(GlobalId increment) {
 
 bool Engine::checkpoint_is_due() const {
   if (settings_.checkpoint_every_increments &&
-      last_.number - last_checkpoint_ >= *settings_.checkpoint_every_increments) {
+      last_.number - std::max<GlobalId>(last_checkpoint_, 0) >= *settings_.checkpoint_every_increments) {
     return true;
   }
   const bool by_time = wall_s() - last_checkpoint_wall_ >= settings_.checkpoint_every_wall_s;
@@ -348,36 +373,52 @@ bool Engine::checkpoint_is_due() const {
 void Engine::write_checkpoint() {
   const Real began = wall_clock();
   timed("checkpoint", [&] {
+    history_->flush_to_disk();
     nlohmann::json state;
-    state["engine"] = {{"increment", last_.number},
+    state["engine"] = {{"program", settings_.program},
+                       {"increment", last_.number},
                        {"time", last_.time},
                        {"dt", last_.dt},
                        {"dt_limit", std::isfinite(next_dt_limit_) ? nlohmann::json(next_dt_limit_) : nlohmann::json()},
                        {"wall_s", wall_s()},
+                       {"longest_checkpoint_s", longest_checkpoint_s_},
                        {"last_output", last_output_},
                        {"space_estimate", space_estimate_.save()},
                        {"is_estimated_halfway", is_estimated_halfway_}};
     if (const Probes* probes = process_.probes()) state["engine"]["probes"] = probes->places();
     state["process"] = process_.save_state();
-    checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state);
+    checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state, process_.save_local());
   });
   last_checkpoint_ = last_.number;
   last_checkpoint_wall_ = wall_s();
   longest_checkpoint_s_ = std::max(longest_checkpoint_s_, wall_clock() - began);
 }
 
+void Engine::write_checkpoint_if_new() {
+  if (last_checkpoint_ != last_.number) write_checkpoint();
+}
+
 std::string Engine::reason_to_stop() {
-  std::string reason = stop_.asked(comm_, settings_.directory);
-  if (!reason.empty()) return reason;
-  const Real needed = wall_clock() - started_at_ + wall_time_margin * longest_checkpoint_s_;
-  if (comm_.broadcast(needed > settings_.wall_time_limit_s)) return "[limits] wall_time";
-  if (std::isfinite(settings_.memory_limit_bytes)) {
-    const auto memory = static_cast<Real>(comm_.sum(current_memory_bytes()));
-    if (memory > settings_.memory_limit_bytes) {
-      return fmt::format("[limits] memory ({:.0f} MiB in use)", memory / 1048576);
-    }
+  const std::string reason = stop_.asked(comm_, settings_.directory);
+  return reason.empty() ? reason_in_limits() : reason;
+}
+
+/// The limit that the next increment and the checkpoint after it would go beyond; empty where there is none.
+std::string Engine::reason_in_limits() {
+  Real checkpoint_s = longest_checkpoint_s_;
+  if (const Timing& output = timing("output"); checkpoint_s == 0 && output.calls > 0) {
+    checkpoint_s = first_checkpoint_in_outputs * output.wall_s / static_cast<Real>(output.calls);
   }
-  return "";
+  const Real needed = wall_since_program_start() + wall_time_margin * (last_increment_s_ + checkpoint_s);
+  if (comm_.broadcast(needed > settings_.wall_time_limit_s)) return "[limits] wall_time";
+  if (!std::isfinite(settings_.memory_limit_bytes)) return "";
+  const Real mib = 1.0 / 1048576;
+  const auto peak = static_cast<Real>(comm_.sum(peak_memory_bytes()));
+  if (last_.number == first_increment_ || peak <= settings_.memory_limit_bytes) return "";
+  return fmt::format(
+      "[limits] memory: increment {} took {:.0f} MiB over all ranks, {:.0f} MiB are allowed; give at "
+      "least {:.0f} MiB",
+      last_.number, peak * mib, settings_.memory_limit_bytes * mib, std::ceil(1.1 * peak * mib));
 }
 
 ErrorBudget Engine::error_budget() {
@@ -397,6 +438,7 @@ void Engine::finish(const std::string& status, int code) {
   const ErrorBudget budget = error_budget();
   write_summary(status, code, budget);
   print_timings();
+  print_checkpoint_cost();
   for (const std::string& line : process_.closing_lines()) log::info("{}", line);
   for (const std::string& line : budget.lines()) log::info("{}", line);
   const Forecast forecast = process_.forecast();
@@ -417,6 +459,13 @@ void Engine::print_timings() {
   std::vector<report::ComponentTime> rows;
   for (const Timing& t : timings_) rows.push_back({t.name, t.calls, t.wall_s});
   report::print_timings(comm_, rows, wall_clock() - started_at_);
+}
+
+void Engine::print_checkpoint_cost() {
+  const Timing& checkpoint = timing("checkpoint");
+  if (checkpoint.calls == 0) return;
+  log::info("checkpoints: {} in {:.2f} s, {:.1f} % of the run", checkpoint.calls, checkpoint.wall_s,
+            100 * checkpoint.wall_s / (wall_clock() - started_at_));
 }
 
 void Engine::write_summary(const std::string& status, int code, const ErrorBudget& budget) {

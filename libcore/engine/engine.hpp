@@ -61,6 +61,7 @@ class Engine {
   void check_field_order();
   void open_outputs();
   bool try_restart();
+  void restore(SavedState&& saved);
   void start_anew();
   int run_increments();
   int solve_once();
@@ -75,11 +76,14 @@ class Engine {
   void print_increment(const Increment& increment);
   void write_fields(GlobalId increment);
   void write_checkpoint();
+  void write_checkpoint_if_new();
   bool checkpoint_is_due() const;
   std::string reason_to_stop();
+  std::string reason_in_limits();
   void finish(const std::string& status, int code);
   void write_summary(const std::string& status, int code, const ErrorBudget& budget);
   void print_timings();
+  void print_checkpoint_cost();
   Timing& timing(const std::string& name);
   template <class Work>
   auto timed(const std::string& name, Work work);
@@ -100,9 +104,10 @@ class Engine {
   GlobalId first_increment_ = 0;                                ///< of this leg
   GlobalId last_output_ = -1;
   GlobalId recorded_iterations_ = 0;  ///< of the linear solver, up to the last row of the history
-  GlobalId last_checkpoint_ = 0;
+  GlobalId last_checkpoint_ = -1;     ///< increment of the newest checkpoint of this run; -1: none
   Real last_checkpoint_wall_ = 0;
   Real longest_checkpoint_s_ = 0;
+  Real last_increment_s_ = 0;  ///< wall time that the last increment took
   Real started_at_ = 0;
   Real wall_of_earlier_legs_ = 0;
   std::string end_reason_;

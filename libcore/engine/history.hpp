@@ -16,13 +16,16 @@ namespace malleus {
 /// Appends rows on the root. Calls are collective; failures are StorageErrors on all ranks.
 class History {
  public:
-  /// A new file; or, to go on after a restart, the rows of the old one up to an increment kept (its columns must be
-  /// the same).
+  /// A new file; or, to go on after a restart, the rows of the old one up to an increment kept. InputError where its
+  /// columns are others: the case has changed.
   static History anew(const Communicator& comm, const std::filesystem::path& path, std::vector<std::string> columns);
   static History resumed(const Communicator& comm, const std::filesystem::path& path, std::vector<std::string> columns,
                          GlobalId last_increment);
 
+  /// StorageError too where the file has gone meanwhile.
   void append(const std::vector<HistoryCell>& row);
+  /// Makes the rows so far survive a power cut.
+  void flush_to_disk();
   const std::vector<std::string>& columns() const noexcept { return columns_; }
   const std::vector<HistoryCell>& last_row() const noexcept { return last_row_; }
 
@@ -32,6 +35,7 @@ class History {
   };
   History(const Communicator& comm, std::filesystem::path path, std::vector<std::string> columns);
   std::string header() const;
+  std::string rows_up_to(GlobalId last_increment);
 
   const Communicator* comm_;
   std::filesystem::path path_;

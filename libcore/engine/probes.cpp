@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 
 #include "base/error.hpp"
 #include "base/log.hpp"
@@ -134,13 +133,11 @@ void Probes::resume(const std::filesystem::path& directory, const FieldStore& fi
     for (const Probe& probe : probes_) {
       std::string kept = header(probe, fields);
       if (std::filesystem::exists(file_of(probe))) {
-        std::istringstream lines(read_text_file(file_of(probe)));
-        std::string line;
-        std::getline(lines, line);
-        while (std::getline(lines, line)) {
+        const std::vector<std::string> lines = read_whole_lines(file_of(probe));
+        for (std::size_t i = 1; i < lines.size(); ++i) {
           Real row_time = 0;
-          const auto parsed = std::from_chars(line.data(), line.data() + line.size(), row_time);
-          if (parsed.ec == std::errc() && row_time <= time * (1 + 1e-12)) kept += line + "\n";
+          const auto parsed = std::from_chars(lines[i].data(), lines[i].data() + lines[i].size(), row_time);
+          if (parsed.ec == std::errc() && row_time <= time * (1 + 1e-12)) kept += lines[i] + "\n";
         }
       }
       write_file_atomically(file_of(probe), kept);

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,10 @@ class Process {
   /// @name Checkpoints: what is not in mesh and fields. Numbers survive bit for bit.
   /// @{
   virtual nlohmann::json save_state() const = 0;  ///< same on all ranks
+  /// What this rank alone knows besides, by local numbers: given back on as many ranks as saved it, to go on with the
+  /// same digits. Elsewhere the process does without. Local.
+  virtual std::vector<Real> save_local() const { return {}; }
+  virtual void restore_local(std::span<const Real> /*saved*/) {}
   /// Mesh and fields in place of the present ones, and the state saved with them.
   virtual void restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::vector<Real>>>&& fields,
                        const nlohmann::json& state) = 0;

@@ -1,10 +1,8 @@
 #include "engine/resources.hpp"
 
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <chrono>
-#include <fstream>
 
 namespace malleus {
 
@@ -12,18 +10,18 @@ Real wall_clock() {
   return std::chrono::duration<Real>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+namespace {
+const Real program_start = wall_clock();
+}
+
+Real wall_since_program_start() {
+  return wall_clock() - program_start;
+}
+
 GlobalId peak_memory_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<GlobalId>(usage.ru_maxrss) * 1024;
-}
-
-GlobalId current_memory_bytes() {
-  std::ifstream statm("/proc/self/statm");
-  GlobalId total = 0;
-  GlobalId resident = 0;
-  statm >> total >> resident;
-  return resident * static_cast<GlobalId>(sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace malleus

@@ -6,8 +6,8 @@
 
 namespace malleus {
 
-Real wall_clock();                ///< monotonic, s
+Real wall_clock();                ///< monotonic, s: no setting of the clock moves it
+Real wall_since_program_start();  ///< s since this process was loaded
 GlobalId peak_memory_bytes();     ///< peak resident set of this process
-GlobalId current_memory_bytes();  ///< resident set of this process
 
 }  // namespace malleus

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <new>
 #include <thread>
 
 #include "base/error.hpp"
+#include "parallel/fault.hpp"
 #include "parallel/session.hpp"
 
 namespace malleus {
@@ -58,6 +60,9 @@ int run_guarded(int argc, char** argv, const Program& program) {
   int own_argc = 1;
   Session session(own_argc, argv, petsc_options);
   const Communicator guard(session.world().raw());
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more is an error that write() returns
+  std::signal(SIGPIPE, SIG_IGN);  // a terminal or a reader that has gone ends no run
+  set_fault_rank(guard.rank());
   try {
     return program(session.world(), arguments);
   } catch (const Error& error) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <csignal>
+#include <ctime>
 
 #include "base/error.hpp"
 
@@ -11,12 +12,24 @@ namespace malleus {
 namespace {
 
 volatile std::sig_atomic_t received_signal = 0;
+timespec received_at{};
 constexpr std::array<int, 4> stop_signals = {SIGUSR1, SIGUSR2, SIGTERM, SIGINT};
 constexpr GlobalId stop_file = 1000;
 
+/// One wish to stop can arrive as several signals: `timeout` and batch systems send to the process and to its group.
+constexpr double same_wish_s = 0.5;
+
 void on_signal(int number) {
-  if (received_signal != 0) _exit(exit_code::checkpointed);
-  received_signal = number;
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (received_signal == 0) {
+    received_at = now;
+    received_signal = number;
+    return;
+  }
+  const auto since = static_cast<double>(now.tv_sec - received_at.tv_sec) +
+                     1e-9 * static_cast<double>(now.tv_nsec - received_at.tv_nsec);
+  if (since > same_wish_s) _exit(exit_code::checkpointed);
 }
 
 std::string signal_name(GlobalId number) {

@@ -10,7 +10,8 @@
 namespace malleus {
 
 /// From its construction SIGUSR1, SIGUSR2, SIGTERM and SIGINT ask for a stop at the end of the increment; a second
-/// one ends the process at once. One per process.
+/// one, half a second or more after the first, ends the process at once with exit code 85: the newest complete
+/// checkpoint is then an earlier one. One per process.
 class StopRequest {
  public:
   StopRequest();

@@ -264,6 +264,12 @@ void StokesOperator::update_viscosity(Real start_rate) {
   leave_out_still();
 }
 
+void StokesOperator::restore_viscosity(std::span<const Real> viscosity, std::span<const Real> shear_rate) {
+  check(viscosity.size() == viscosity_.size() && shear_rate.size() == shear_rate_.size(), "a value an element");
+  viscosity_.assign(viscosity.begin(), viscosity.end());
+  shear_rate_.assign(shear_rate.begin(), shear_rate.end());
+}
+
 bool StokesOperator::is_linear() const {
   return model_->is_linear() &&
          std::all_of(terms_.begin(), terms_.end(), [](const ResidualTerm* term) { return term->is_linear(); });

@@ -108,6 +108,8 @@ class StokesOperator {
   /// Viscosities of the elements at the state's shear rates, or at the model's start_rates() for one [1/s]. Local.
   void update_viscosity(const StokesState& state);
   void update_viscosity(Real start_rate);
+  /// Viscosities and shear rates that an update gave before, on the same mesh, [element]. Local.
+  void restore_viscosity(std::span<const Real> viscosity, std::span<const Real> shear_rate);
   std::span<const Real> viscosity() const noexcept { return viscosity_; }    ///< [element], Pa.s
   std::span<const Real> shear_rate() const noexcept { return shear_rate_; }  ///< [element], of the last update, 1/s
   std::span<const Real> volume() const noexcept { return volume_; }          ///< [element], m^3 (ring)

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <memory>
 
 #include "base/error.hpp"
@@ -54,6 +56,8 @@ class Source {
   virtual std::int64_t integer() = 0;
   virtual std::int64_t count() = 0;
   virtual Real real() = 0;
+  /// Of the file, not read yet: no section has more entries.
+  virtual std::size_t bytes_left() const = 0;
 };
 
 class AsciiSource : public Source {
@@ -85,6 +89,7 @@ class AsciiSource : public Source {
     accept(end);
     return value;
   }
+  std::size_t bytes_left() const override { return static_cast<std::size_t>(text_.c_str() + text_.size() - at_); }
 
  private:
   void skip_blank() {
@@ -99,7 +104,8 @@ class AsciiSource : public Source {
     }
   }
   void accept(const char* end) {
-    if (end == at_) {
+    const bool ends_well = *end == 0 || *end == '#' || std::isspace(static_cast<unsigned char>(*end)) != 0;
+    if (end == at_ || !ends_well) {
       const auto line = 1 + std::count(text_.c_str(), at_, '\n');
       throw InputError(fmt::format("{}:{}: a number was expected", path_.string(), line));
     }
@@ -148,6 +154,7 @@ class BinarySource : public Source {
   std::int64_t integer() override { return version_ >= 4 ? take<std::int64_t>() : take<std::int32_t>(); }
   std::int64_t count() override { return integer(); }
   Real real() override { return version_ >= 2 ? take<double>() : static_cast<Real>(take<float>()); }
+  std::size_t bytes_left() const override { return bytes_.size() - at_; }
   std::int32_t small_integer() { return take<std::int32_t>(); }
 
  private:
@@ -182,35 +189,57 @@ std::size_t checked_count(Source& source, const fs::path& path) {
   const std::int64_t n = source.count();
   if (n < 0 || n > 2000000000)
     throw InputError(fmt::format("{}: a section of {} entries is out of range", path.string(), n));
+  if (static_cast<std::size_t>(n) > source.bytes_left())
+    throw InputError(fmt::format("{}: a section of {} entries: the file is cut off", path.string(), n));
   return static_cast<std::size_t>(n);
 }
 
-void read_vertices(Source& source, std::size_t n, MeditMesh& mesh) {
+/// A node from 0 on; -1 where the number is none that a file can have.
+LocalId node_number(Source& source) {
+  const std::int64_t number = source.integer();
+  return number < 1 || number > std::numeric_limits<LocalId>::max() ? -1 : static_cast<LocalId>(number - 1);
+}
+
+/// References are labels: those beyond 32 bits are refused rather than cut.
+std::int32_t reference(Source& source, const fs::path& path) {
+  const std::int64_t value = source.integer();
+  if (value < std::numeric_limits<std::int32_t>::min() || value > std::numeric_limits<std::int32_t>::max())
+    throw InputError(fmt::format("{}: the reference {} is out of range", path.string(), value));
+  return static_cast<std::int32_t>(value);
+}
+
+Real finite_number(Source& source, const fs::path& path) {
+  const Real value = source.real();
+  if (!std::isfinite(value)) throw InputError(fmt::format("{}: a coordinate or a size is not finite", path.string()));
+  return value;
+}
+
+void read_vertices(Source& source, std::size_t n, const fs::path& path, MeditMesh& mesh) {
   mesh.coordinates.reserve(n * static_cast<std::size_t>(mesh.dimension));
   mesh.node_reference.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < mesh.dimension; ++k) mesh.coordinates.push_back(source.real());
-    mesh.node_reference.push_back(static_cast<std::int32_t>(source.integer()));
+    for (int k = 0; k < mesh.dimension; ++k) mesh.coordinates.push_back(finite_number(source, path));
+    mesh.node_reference.push_back(reference(source, path));
   }
 }
 
-void read_entities(Source& source, std::size_t n, int nodes, std::vector<LocalId>& numbers,
+void read_entities(Source& source, std::size_t n, int nodes, const fs::path& path, std::vector<LocalId>& numbers,
                    std::vector<std::int32_t>* references) {
   numbers.reserve(n * static_cast<std::size_t>(nodes));
   for (std::size_t i = 0; i < n; ++i) {
-    for (int k = 0; k < nodes; ++k) numbers.push_back(static_cast<LocalId>(source.integer() - 1));
-    if (references != nullptr) references->push_back(static_cast<std::int32_t>(source.integer()));
+    for (int k = 0; k < nodes; ++k) numbers.push_back(node_number(source));
+    if (references != nullptr) references->push_back(reference(source, path));
   }
 }
 
 void read_section(Source& source, int code, const fs::path& path, MeditMesh& mesh) {
   const std::size_t n = checked_count(source, path);
-  if (code == vertices_code) read_vertices(source, n, mesh);
-  if (code == 5) read_entities(source, n, 2, mesh.edges, &mesh.edge_reference);
-  if (code == 6) read_entities(source, n, 3, mesh.triangles, &mesh.triangle_reference);
-  if (code == 8) read_entities(source, n, 4, mesh.tetrahedra, &mesh.tetrahedron_reference);
-  if (code == 13) read_entities(source, n, 1, mesh.corners, nullptr);
-  if (code == 14) read_entities(source, n, 1, mesh.ridges, nullptr);
+  if (code == vertices_code) read_vertices(source, n, path, mesh);
+  if (code == 5) read_entities(source, n, 2, path, mesh.edges, &mesh.edge_reference);
+  if (code == 6) read_entities(source, n, 3, path, mesh.triangles, &mesh.triangle_reference);
+  if (code == 8) read_entities(source, n, 4, path, mesh.tetrahedra, &mesh.tetrahedron_reference);
+  if (code == 13) read_entities(source, n, 1, path, mesh.corners, nullptr);
+  if (code == 14) read_entities(source, n, 1, path, mesh.ridges, nullptr);
 }
 
 void check_nodes(const fs::path& path, const std::vector<LocalId>& numbers, LocalId limit, const char* what) {
@@ -320,6 +349,7 @@ MeditMesh read_medit(const fs::path& path) {
   MeditMesh mesh;
   for (int code = source->next_section(); code != end_code; code = source->next_section()) {
     if (code == 3) {
+      if (!mesh.coordinates.empty()) throw InputError(fmt::format("{}: Dimension comes after Vertices", path.string()));
       set_dimension(*source, path, mesh.dimension);
     } else if (code != 0 && code != solution_code) {
       read_section(*source, code, path, mesh);
@@ -348,7 +378,7 @@ MeditSolution read_medit_solution(const fs::path& path) {
       throw InputError(fmt::format("{}: one scalar or one symmetric tensor per node is expected", path.string()));
     solution.components = kind == 1 ? 1 : solution.dimension * (solution.dimension + 1) / 2;
     solution.values.resize(n * static_cast<std::size_t>(solution.components));
-    for (Real& value : solution.values) value = source->real();
+    for (Real& value : solution.values) value = finite_number(*source, path);
   }
   if (solution.components == 0) throw InputError(fmt::format("{}: no section SolAtVertices", path.string()));
   return solution;

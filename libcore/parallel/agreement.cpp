@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "parallel/fault.hpp"
 
 namespace malleus {
 namespace {
@@ -18,6 +19,7 @@ struct Caught {
 
 Caught run_and_catch(const std::function<void()>& work) {
   try {
+    pass_fault_point("agreement");
     work();
   } catch (const Error& error) {
     return {error.code(), error.what()};

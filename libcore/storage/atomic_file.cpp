@@ -50,6 +50,17 @@ void write_file_atomically(const std::filesystem::path& path, const std::string&
   if (::rename(aside.c_str(), path.c_str()) != 0) fail(path, "cannot be renamed into place");
 }
 
+void flush_to_disk(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY);
+  if (file < 0 || (::fsync(file) != 0 && errno != EINVAL)) {
+    const int reason = errno;
+    if (file >= 0) ::close(file);
+    errno = reason;
+    fail(path, "cannot be flushed to the disk");
+  }
+  ::close(file);
+}
+
 void make_directories(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
@@ -65,6 +76,17 @@ std::string read_text_file(const std::filesystem::path& path) {
   text << file.rdbuf();
   if (file.bad()) fail(path, "cannot be read");
   return text.str();
+}
+
+std::vector<std::string> read_whole_lines(const std::filesystem::path& path) {
+  const std::string text = read_text_file(path);
+  std::vector<std::string> lines;
+  std::size_t begin = 0;
+  for (std::size_t end = text.find('\n'); end != std::string::npos; end = text.find('\n', begin)) {
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
 }
 
 }  // namespace malleus

@@ -1,14 +1,10 @@
 #include "storage/checkpoint.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 
 #include "base/error.hpp"
@@ -24,8 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 constexpr std::size_t kept_checkpoints = 2;
+constexpr const char* unfinished = "unfinished-";  ///< before the name of what is not whole
 
 std::string part_name(int part) {
   return fmt::format("part-{:05d}.h5", part);
@@ -50,23 +47,12 @@ GlobalId text_checksum(const std::string& text) {
   return static_cast<GlobalId>(crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size())));
 }
 
-/// Makes what was written (a file, or the names in a directory) survive a power cut.
-void flush_to_disk(const fs::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY);
-  if (file < 0 || (::fsync(file) != 0 && errno != EINVAL)) {
-    const int reason = errno;
-    if (file >= 0) ::close(file);
-    throw StorageError(fmt::format("{}: cannot be flushed to the disk: {}", path.string(), std::strerror(reason)));
-  }
-  ::close(file);
-}
-
 template <class T>
 void write_list(H5File& file, const std::string& path, const std::vector<T>& values) {
   file.write(path, std::span<const T>(values), {values.size()});
 }
 
-void write_part(const fs::path& path, const Mesh& mesh, const FieldStore& fields) {
+void write_part(const fs::path& path, const Mesh& mesh, const FieldStore& fields, const std::vector<Real>& local) {
   H5File file(path, H5File::Mode::create);
   file.make_group("/mesh");
   write_list(file, "/mesh/owned_nodes", std::vector<std::int64_t>{mesh.owned_nodes(), mesh.node_ownership.begin()});
@@ -83,6 +69,7 @@ void write_part(const fs::path& path, const Mesh& mesh, const FieldStore& fields
   for (const Field* field : fields.all()) {
     file.write("/fields/" + field->spec().name, field->values(), {field->values().size()});
   }
+  write_list(file, "/local", local);
   file.close();
 }
 
@@ -112,6 +99,7 @@ struct Part {
   std::int64_t owned_nodes = 0;
   std::int64_t first_node = 0;
   std::vector<std::vector<Real>> fields;
+  std::vector<Real> local;
 };
 
 Part read_part(const fs::path& path, const nlohmann::json& manifest, const std::vector<FieldSpec>& specs) {
@@ -136,6 +124,7 @@ Part read_part(const fs::path& path, const nlohmann::json& manifest, const std::
   mesh.facet_group = file.read_int32("/mesh/facet_group");
   mesh.exterior_facets = static_cast<LocalId>(file.read_int64("/mesh/exterior_facets").at(0));
   for (const FieldSpec& spec : specs) part.fields.push_back(file.read_doubles("/fields/" + spec.name));
+  part.local = file.read_doubles("/local");
   return part;
 }
 
@@ -182,6 +171,7 @@ void read_same_ranks(const Communicator& comm, const fs::path& directory, const 
     part = read_part(directory / part_name(comm.rank()), manifest, specs);
   });
   saved.mesh = std::move(part.mesh);
+  saved.local = std::move(part.local);
   saved.mesh.node_ownership = Ownership(comm, static_cast<LocalId>(part.owned_nodes));
   saved.mesh.node_halo = Halo(comm, saved.mesh.node_ownership, saved.mesh.copy_numbers);
   for (std::size_t f = 0; f < specs.size(); ++f) saved.fields.emplace_back(specs[f], std::move(part.fields[f]));
@@ -243,10 +233,29 @@ std::vector<std::string> checkpoints_in(const fs::path& directory) {
     const std::string name = entry.path().filename().string();
     const bool is_number =
         !name.empty() && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
-    if (entry.is_directory() && is_number) names.push_back(name);
+    if (entry.is_directory(ignored) && is_number) names.push_back(name);
   }
   std::sort(names.rbegin(), names.rend());
   return names;
+}
+
+/// Removes what killed or failed writes left, which would fill the disk.
+void remove_unfinished(const fs::path& directory) {
+  std::error_code ignored;
+  std::vector<fs::path> left;
+  for (const auto& entry : fs::directory_iterator(directory, ignored)) {
+    if (entry.path().filename().string().starts_with(unfinished)) left.push_back(entry.path());
+  }
+  for (const fs::path& path : left) fs::remove_all(path, ignored);
+}
+
+/// Puts a checkpoint that is whole under its name; one that bears it already is damaged.
+void put_in_place(const fs::path& aside, const fs::path& target) {
+  std::error_code error;
+  fs::remove_all(target, error);
+  fs::rename(aside, target, error);
+  if (error) throw StorageError(fmt::format("{}: cannot be renamed: {}", aside.string(), error.message()));
+  flush_to_disk(target.parent_path());
 }
 
 }  // namespace
@@ -254,46 +263,77 @@ std::vector<std::string> checkpoints_in(const fs::path& directory) {
 CheckpointStore::CheckpointStore(const Communicator& comm, fs::path output_directory)
     : comm_(comm), directory_(std::move(output_directory) / "checkpoints") {}
 
-void CheckpointStore::write(GlobalId increment, const Mesh& mesh, const FieldStore& fields,
-                            const nlohmann::json& state) {
+struct CheckpointStore::Content {
+  GlobalId increment;
+  const Mesh& mesh;
+  const FieldStore& fields;
+  const nlohmann::json& state;
+  const std::vector<Real>& local;
+};
+
+void CheckpointStore::write(GlobalId increment, const Mesh& mesh, const FieldStore& fields, const nlohmann::json& state,
+                            const std::vector<Real>& local) {
   const fs::path target = directory_ / directory_name(increment);
-  const fs::path aside = directory_ / ("unfinished-" + directory_name(increment));
+  const fs::path aside = directory_ / (unfinished + directory_name(increment));
   on_root(comm_, [&] {
     make_directories(directory_);
-    std::error_code ignored;
-    fs::remove_all(aside, ignored);
+    remove_unfinished(directory_);
     make_directories(aside);
   });
+  try {
+    write_aside(aside, {increment, mesh, fields, state, local});
+  } catch (const StorageError& error) {  // on all ranks: the space is given back
+    on_root(comm_, [&] { remove_unfinished(directory_); });
+    throw StorageError(fmt::format("{}; {}", error.what(), describe_newest()));
+  }
+  on_root(comm_, [&] {
+    put_in_place(aside, target);
+    // Those of higher number are of a run that went on from an earlier state: damaged ones that were passed over.
+    std::size_t kept = 0;
+    std::error_code ignored;
+    for (const std::string& name : checkpoints_in(directory_)) {
+      const bool is_kept = name <= target.filename().string() && kept < kept_checkpoints;
+      if (is_kept) ++kept;
+      if (!is_kept) fs::remove_all(directory_ / name, ignored);
+    }
+  });
+}
+
+void CheckpointStore::write_aside(const fs::path& aside, const Content& saved) {
   GlobalId checksum = 0;
   agree(comm_, [&] {
     const fs::path part = aside / part_name(comm_.rank());
-    write_part(part, mesh, fields);
+    write_part(part, saved.mesh, saved.fields, saved.local);
     flush_to_disk(part);
     checksum = file_checksum(part);
   });
   const std::vector<std::string> checksums = comm_.gather_to_root(std::to_string(checksum));
   on_root(comm_, [&] {
     nlohmann::json content = {{"format", format_version},
-                              {"increment", increment},
+                              {"increment", saved.increment},
                               {"ranks", comm_.size()},
-                              {"dim", mesh.dim},
-                              {"elements", mesh.total_elements},
-                              {"region_names", mesh.region_names},
-                              {"group_names", mesh.group_names},
-                              {"fields", describe_fields(fields)},
-                              {"state", state}};
+                              {"dim", saved.mesh.dim},
+                              {"elements", saved.mesh.total_elements},
+                              {"region_names", saved.mesh.region_names},
+                              {"group_names", saved.mesh.group_names},
+                              {"fields", describe_fields(saved.fields)},
+                              {"state", saved.state}};
     for (const std::string& sum : checksums) content["checksums"].push_back(std::stoll(sum));
     const nlohmann::json sealed = {{"crc32", text_checksum(content.dump())}, {"content", content}};
     write_file_atomically(aside / "manifest.json", sealed.dump(1));
     flush_to_disk(aside);
-    std::error_code error;
-    fs::remove_all(target, error);
-    fs::rename(aside, target, error);
-    if (error) throw StorageError(fmt::format("{}: cannot be renamed: {}", aside.string(), error.message()));
-    flush_to_disk(directory_);
-    const std::vector<std::string> names = checkpoints_in(directory_);
-    for (std::size_t i = kept_checkpoints; i < names.size(); ++i) fs::remove_all(directory_ / names[i], error);
   });
+}
+
+std::string CheckpointStore::describe_newest() const {
+  std::string text;
+  on_root(comm_, [&] {
+    const std::vector<std::string> names = checkpoints_in(directory_);
+    text = names.empty() ? "there is no complete checkpoint"
+                         : fmt::format("the newest complete checkpoint is {}", (directory_ / names.front()).string());
+  });
+  comm_.broadcast(text);
+  return text;
 }
 
 std::optional<SavedState> CheckpointStore::read_newest() const {

@@ -41,6 +41,16 @@ class TimelessProperties {
   Handle list_;
 };
 
+/// Equal stretches of rows, of some megabytes each.
+std::vector<hsize_t> chunk_of(std::vector<hsize_t> shape, std::size_t value_bytes) {
+  constexpr hsize_t most_bytes = hsize_t{1} << 24;
+  const hsize_t row = std::accumulate(shape.begin() + 1, shape.end(), hsize_t{value_bytes}, std::multiplies<>());
+  const hsize_t most_rows = std::max<hsize_t>(1, most_bytes / row);
+  const hsize_t chunks = (shape[0] + most_rows - 1) / most_rows;
+  shape[0] = (shape[0] + chunks - 1) / chunks;
+  return shape;
+}
+
 template <class T>
 hid_t memory_type();
 template <>
@@ -64,9 +74,12 @@ hid_t memory_type<std::int64_t>() {
 
 H5File::H5File(const std::filesystem::path& path, Mode mode) : path_(path) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are told by our own errors
-  file_ = mode == Mode::create ? H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)
-                               : H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (file_ < 0) fail(mode == Mode::create ? "cannot be created" : "cannot be opened as an HDF5 file");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  is_checked_ = mode == Mode::create_checked;
+  if (is_checked_) H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
+  file_ = mode == Mode::read ? H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get())
+                             : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get());
+  if (file_ < 0) fail(mode == Mode::read ? "cannot be opened as an HDF5 file" : "cannot be created");
 }
 
 H5File::~H5File() {
@@ -96,6 +109,11 @@ void H5File::write_dataset(const std::string& path, std::span<const T> values, c
   check(count == values.size(), "the shape of a dataset fits its values");
   const TimelessProperties timeless(H5P_DATASET_CREATE);
   const std::vector<hsize_t> shape(dims.begin(), dims.end());
+  if (is_checked_ && count > 0) {
+    const std::vector<hsize_t> chunk = chunk_of(shape, sizeof(T));
+    H5Pset_chunk(timeless.get(), static_cast<int>(chunk.size()), chunk.data());
+    H5Pset_fletcher32(timeless.get());
+  }
   const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
   const Handle set(
       H5Dcreate2(file_, path.c_str(), memory_type<T>(), space.get(), H5P_DEFAULT, timeless.get(), H5P_DEFAULT),

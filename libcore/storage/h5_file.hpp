@@ -16,7 +16,11 @@ namespace malleus {
 /// ("/p0003/points"). Every failure is a StorageError that names the file. Local.
 class H5File {
  public:
-  enum class Mode { create, read };
+  enum class Mode {
+    create,
+    create_checked,  ///< headers and values carry checksums, which every reader of HDF5 1.10 or newer verifies
+    read
+  };
   H5File(const std::filesystem::path& path, Mode mode);
   H5File(const H5File&) = delete;
   H5File& operator=(const H5File&) = delete;
@@ -24,7 +28,8 @@ class H5File {
 
   void make_group(const std::string& path);
 
-  /// Contiguous datasets; dims: their shape, row-major; the product is values.size().
+  /// Contiguous datasets (in chunks where they are checked); dims: their shape, row-major; the product is
+  /// values.size().
   void write(const std::string& path, std::span<const double> values, std::vector<std::uint64_t> dims);
   void write(const std::string& path, std::span<const float> values, std::vector<std::uint64_t> dims);
   void write(const std::string& path, std::span<const std::int32_t> values, std::vector<std::uint64_t> dims);
@@ -51,6 +56,7 @@ class H5File {
 
   std::filesystem::path path_;
   std::int64_t file_ = -1;
+  bool is_checked_ = false;
 };
 
 /// "HDF5 1.10.8", say: the library in use. Local.

@@ -1,7 +1,6 @@
 #include "storage/mesh_file.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -13,28 +12,17 @@
 #include "storage/atomic_file.hpp"
 #include "storage/field_list.hpp"
 #include "storage/h5_file.hpp"
+#include "storage/seal.hpp"
 #include "storage/shared_h5_file.hpp"
 
 namespace malleus {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 
 std::string group_of(GlobalId part) {
   return fmt::format("/p{:04d}", part);
-}
-
-template <class T>
-GlobalId add_checksum(GlobalId sum, const std::vector<T>& values) {
-  constexpr std::size_t piece = std::size_t{1} << 30;
-  const auto* bytes = reinterpret_cast<const Bytef*>(values.data());
-  const std::size_t size = values.size() * sizeof(T);
-  auto crc = static_cast<uLong>(sum);
-  for (std::size_t at = 0; at < size; at += piece) {
-    crc = crc32(crc, bytes + at, static_cast<uInt>(std::min(piece, size - at)));
-  }
-  return static_cast<GlobalId>(crc);
 }
 
 /// The arrays of one partition under their names in the file.
@@ -47,18 +35,6 @@ struct PartArrays {
   std::vector<std::int32_t> facets;       ///< [named facet][dim]
   std::vector<std::int32_t> facet_group;
   std::vector<std::vector<double>> fields;  ///< in the order of the field list
-
-  GlobalId checksum() const {
-    GlobalId sum = add_checksum(0, points);
-    sum = add_checksum(sum, node_numbers);
-    sum = add_checksum(sum, cells);
-    sum = add_checksum(sum, region);
-    sum = add_checksum(sum, element_ids);
-    sum = add_checksum(sum, facets);
-    sum = add_checksum(sum, facet_group);
-    for (const auto& values : fields) sum = add_checksum(sum, values);
-    return sum;
-  }
 };
 
 /// The entities of one part of this rank's mesh, by local index, increasing.
@@ -139,26 +115,25 @@ PartArrays arrays_of(const Mesh& mesh, const FieldStore& fields, const PartEntit
 
 /// Sizes that every rank must know of every partition, so that all can make its datasets.
 struct PartSizes {
-  GlobalId nodes, elements, ids, facets, checksum;
+  GlobalId nodes, elements, ids, facets;
 };
 
 /// The sizes of all parts on all ranks; `arrays` are those of the parts from `first` on. Collective.
 std::vector<PartSizes> gather_sizes(const Communicator& comm, const std::vector<PartArrays>& arrays, int first,
                                     int n_parts) {
-  constexpr std::size_t entries = 5;
+  constexpr std::size_t entries = 4;
   std::vector<GlobalId> table(static_cast<std::size_t>(n_parts) * entries, 0);
   for (std::size_t i = 0; i < arrays.size(); ++i) {
     const PartArrays& part = arrays[i];
-    const std::array<GlobalId, entries> row = {static_cast<GlobalId>(part.node_numbers.size()),
-                                               static_cast<GlobalId>(part.region.size()),
-                                               static_cast<GlobalId>(part.element_ids.size()),
-                                               static_cast<GlobalId>(part.facet_group.size()), part.checksum()};
+    const std::array<GlobalId, entries> row = {
+        static_cast<GlobalId>(part.node_numbers.size()), static_cast<GlobalId>(part.region.size()),
+        static_cast<GlobalId>(part.element_ids.size()), static_cast<GlobalId>(part.facet_group.size())};
     std::copy(row.begin(), row.end(), table.begin() + static_cast<std::ptrdiff_t>((first + i) * entries));
   }
   comm.sum_in_place(std::span<GlobalId>(table));
   std::vector<PartSizes> sizes;
   for (std::size_t i = 0; i < table.size(); i += entries) {
-    sizes.push_back({table[i], table[i + 1], table[i + 2], table[i + 3], table[i + 4]});
+    sizes.push_back({table[i], table[i + 1], table[i + 2], table[i + 3]});
   }
   return sizes;
 }
@@ -254,8 +229,7 @@ nlohmann::json read_head(const H5File& file, const fs::path& path) {
   return head;
 }
 
-FieldedPiece read_part(const H5File& file, const fs::path& path, const nlohmann::json& head, GlobalId number,
-                       Real length_unit) {
+FieldedPiece read_part(const H5File& file, const nlohmann::json& head, GlobalId number, Real length_unit) {
   const std::string group = group_of(number);
   const std::vector<FieldSpec> specs = field_specs(head.at("fields"));
   PartArrays part;
@@ -267,9 +241,6 @@ FieldedPiece read_part(const H5File& file, const fs::path& path, const nlohmann:
   part.facets = file.read_int32(group + "/facets");
   part.facet_group = file.read_int32(group + "/facet_group");
   for (const FieldSpec& spec : specs) part.fields.push_back(file.read_doubles(group + "/" + spec.name));
-  if (part.checksum() != head.at("checksums").at(static_cast<std::size_t>(number)).get<GlobalId>()) {
-    throw InputError(fmt::format("{}: wrong checksum of {}: the file is damaged", path.string(), group));
-  }
   FieldedPiece loose;
   loose.piece.dim = head.at("dim");
   loose.piece.node_numbers = std::move(part.node_numbers);
@@ -303,6 +274,7 @@ void number_elements(const Communicator& comm, std::vector<FieldedPiece>& pieces
 
 /// The description, read once and known to all ranks.
 nlohmann::json shared_head(const Communicator& comm, const fs::path& path) {
+  require_seal(comm, path);
   std::string text;
   on_root(comm, [&] {
     try {
@@ -330,7 +302,7 @@ std::vector<FieldedPiece> read_my_parts(const Communicator& comm, const fs::path
       const H5File file(path, H5File::Mode::read);
       for (int p = first_part_of_rank(parts, comm.rank(), comm.size());
            p < first_part_of_rank(parts, comm.rank() + 1, comm.size()); ++p) {
-        pieces.push_back(read_part(file, path, head, p, length_unit));
+        pieces.push_back(read_part(file, head, p, length_unit));
       }
     } catch (const StorageError& error) {
       throw InputError(error.what());
@@ -355,8 +327,7 @@ void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh&
     arrays.push_back(arrays_of(mesh, fields, part));
   }
   const std::vector<PartSizes> sizes = gather_sizes(comm, arrays, first, n_parts);
-  nlohmann::json head = describe(mesh, fields, n_parts);
-  for (const PartSizes& part : sizes) head["checksums"].push_back(part.checksum);
+  const nlohmann::json head = describe(mesh, fields, n_parts);
 
   fs::path aside = path;
   aside += ".tmp";
@@ -377,6 +348,8 @@ void write_mesh_file(const Communicator& comm, const fs::path& path, const Mesh&
   });
   file.close();
   on_root(comm, [&] {
+    seal_file(aside);
+    flush_to_disk(aside);
     std::error_code error;
     fs::rename(aside, path, error);
     if (error) throw StorageError(fmt::format("{}: cannot be renamed: {}", aside.string(), error.message()));

@@ -10,8 +10,8 @@
 namespace malleus {
 
 /// Writes PATH.h5 by all ranks at once, a group /pRRRR per partition that holds elements (float64 coordinates, global
-/// node numbers, regions, groups, file places, node and element fields, a checksum), and PATH's .xdmf beside it. Made
-/// under a temporary name and renamed. StorageError. Collective.
+/// node numbers, regions, groups, file places, node and element fields), and PATH's .xdmf beside it. Made under a
+/// temporary name, sealed with a checksum over all its bytes, and renamed. StorageError. Collective.
 void write_mesh_file(const Communicator& comm, const std::filesystem::path& path, const Mesh& mesh,
                      const FieldStore& fields);
 

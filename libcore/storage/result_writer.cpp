@@ -121,12 +121,13 @@ void ResultWriter::write(GlobalId increment, Real time, const Mesh& mesh, const 
   agree(comm_, [&] {
     if (images.empty()) return;
     const std::string file_name = fmt::format("s{:06d}.r{:04d}.h5", increment, leader);
-    H5File file(fields_directory() / file_name, H5File::Mode::create);
+    H5File file(fields_directory() / file_name, H5File::Mode::create_checked);
     for (const GridImage& image : images) {
       precision_ == Precision::float32 ? write_grid<float>(file, image) : write_grid<double>(file, image);
       grids += grid_xml(image, fmt::format("{}.fields/{}", name_, file_name), float_bytes);
     }
     file.close();
+    flush_to_disk(fields_directory() / file_name);
     bytes_written_ += static_cast<GlobalId>(std::filesystem::file_size(fields_directory() / file_name));
   });
   const std::vector<std::string> all = comm_.gather_to_root(grids);

@@ -12,10 +12,11 @@
 namespace malleus {
 
 /// Writes NAME.xdmf beside NAME.fields/ in a directory. Each step is one HDF5 file per rank (per group of ranks beyond
-/// 64), closed before the .xdmf, which is written aside and renamed, names it: the results can be opened at any
-/// moment, also after a crash. Form: a Temporal collection of flat Spatial collections with <Time> on the Spatial
-/// one, one Uniform grid per non-empty partition, relative paths, each DataItem a whole dataset (the form that
-/// ParaView 5.11 reads in serial and in parallel). Every call is collective; failures are StorageErrors on all ranks.
+/// 64), closed and flushed before the .xdmf, which is written aside and renamed, names it, with checksums: the results
+/// can be opened at any moment, also after a crash. Form: a Temporal collection of flat Spatial collections with <Time>
+/// on the Spatial one, one Uniform grid per non-empty partition, relative paths, each DataItem a whole dataset (the
+/// form that ParaView 5.11 reads in serial and in parallel). Every call is collective; failures are StorageErrors on
+/// all ranks.
 class ResultWriter {
  public:
   enum class Precision { float32, float64 };

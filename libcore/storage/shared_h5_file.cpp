@@ -4,6 +4,7 @@
 #include <hdf5.h>
 
 #include "base/error.hpp"
+#include "storage/seal.hpp"
 
 namespace malleus {
 namespace {
@@ -33,7 +34,10 @@ SharedH5File::SharedH5File(const Communicator& comm, const std::filesystem::path
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fapl_mpio(access, comm.raw(), MPI_INFO_NULL);
-  file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
+  H5Pset_userblock(creation, seal_bytes);
+  file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access);
+  H5Pclose(creation);
   H5Pclose(access);
   if (file_ < 0) fail("cannot be created");
 }

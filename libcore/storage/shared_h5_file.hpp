@@ -11,7 +11,8 @@
 
 namespace malleus {
 
-/// Structure is made collectively, data written by each rank alone. Failures are StorageErrors.
+/// Structure is made collectively, data written by each rank alone. Its first bytes are left free for seal_file().
+/// Failures are StorageErrors.
 class SharedH5File {
  public:
   enum class Type { float64, int32, int64 };

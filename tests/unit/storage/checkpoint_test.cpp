@@ -93,6 +93,26 @@ TEST_P(Checkpoint, AFlippedBitIsFoundAndTheOlderOneServes) {
   EXPECT_EQ(store.read_newest()->increment, 1);
 }
 
+TEST_P(Checkpoint, OnesThatWerePassedOverDoNotCountAmongTheTwo) {
+  const ScratchDirectory scratch;
+  const Scene scene(world(), GetParam());
+  CheckpointStore store(world(), scratch.path());
+  store.write(1, scene.mesh, scene.fields, {});
+  store.write(9, scene.mesh, scene.fields, {});
+  const fs::path directory = scratch.path() / "checkpoints";
+  if (world().is_root()) {
+    fs::resize_file(directory / "000000009/part-00000.h5", 100);
+    fs::create_directories(directory / "unfinished-000000005");
+  }
+  world().barrier();
+  EXPECT_EQ(store.read_newest()->increment, 1);
+  store.write(3, scene.mesh, scene.fields, {});
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(directory)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names, (std::vector<std::string>{"000000001", "000000003"}));
+}
+
 TEST_P(Checkpoint, AnUnfinishedOneIsNeverTakenForWhole) {
   const ScratchDirectory scratch;
   const Scene scene(world(), GetParam());

@@ -91,6 +91,31 @@ TEST_P(MeshFile, ADamagedOrForeignFileIsAnInputError) {
   EXPECT_EQ(code_of(scratch.path() / "absent.h5"), exit_code::wrong_input);
 }
 
+TEST_P(MeshFile, AFlippedBitAnywhereIsFound) {
+  write_mesh_file(world(), path, mesh, fields);
+  const auto size = static_cast<std::size_t>(std::filesystem::file_size(path));
+  const auto flip = [&](std::size_t at) {
+    if (world().is_root()) {
+      std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+      file.seekg(static_cast<std::streamoff>(at));
+      const int byte = file.get();
+      file.seekp(static_cast<std::streamoff>(at));
+      file.put(static_cast<char>(byte ^ (1 << at % 8)));
+    }
+    world().barrier();
+  };
+  for (std::size_t at = 0; at < size; at += 1 + size / 97) {
+    flip(at);
+    FieldStore read_fields;
+    EXPECT_THROW(read_mesh_file(world(), path, 1, read_fields), InputError) << at;
+    flip(at);
+  }
+  if (world().is_root()) std::filesystem::resize_file(path, size - 1);
+  world().barrier();
+  FieldStore read_fields;
+  EXPECT_THROW(read_mesh_file(world(), path, 1, read_fields), InputError);
+}
+
 INSTANTIATE_TEST_SUITE_P(Dimensions, MeshFile, testing::Values(2, 3));
 
 }  // namespace
