@@ -61,6 +61,8 @@ bool is_recorded(const CommonSections& common, const std::string& field) {
 ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
     : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
   if (case_.common.remesh && case_.common.remesh->active) remeshing_.emplace(*case_.common.remesh, remeshed_scene());
+  if (Rebalancing::is_wanted(case_.common.partition, *scene_->comm))
+    rebalancing_.emplace(case_.common.partition, rebalanced_scene());
   flow_.set_keeps_stress(is_recorded(case_.common, field_name::stress));
   if (case_.common.reference) errors_.emplace(*scene_, flow_, *case_.common.reference);
   if (scene_->thermal) heat_.emplace(*scene_, flow_);
@@ -72,12 +74,21 @@ ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> s
 std::vector<Component*> ForgeProcess::components() {
   std::vector<Component*> list;
   if (remeshing_) list.push_back(&*remeshing_);
+  if (rebalancing_) list.push_back(&*rebalancing_);
   list.push_back(&flow_);
   if (errors_) list.push_back(&*errors_);
   if (tracers_) list.push_back(&*tracers_);
   if (heat_) list.push_back(&*heat_);
   list.push_back(&motion_);
   return list;
+}
+
+RebalancedScene ForgeProcess::rebalanced_scene() {
+  const auto mesh_moved = [this] {
+    scene_->boundaries->mesh_changed();
+    flow_.mesh_changed();
+  };
+  return {scene_->comm, &scene_->mesh, &scene_->fields, mesh_moved};
 }
 
 RemeshedScene ForgeProcess::remeshed_scene() {
@@ -412,6 +423,7 @@ nlohmann::json ForgeProcess::save_state() const {
                           {"strain_rate", flow_.largest_strain_rate()}};
   if (remeshing_) state["remeshing"] = remeshing_->save();
   if (heat_) state["heat"] = heat_json(heat_->totals());
+  if (rebalancing_) state["balance"] = rebalancing_->save();
   for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
   for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
   return state;
@@ -442,6 +454,7 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   flow_.set_rates(state.at("edge_rate"), state.at("strain_rate"));
   if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
   if (heat_ && state.contains("heat")) heat_->set_totals(heat_totals(state.at("heat")));
+  if (rebalancing_ && state.contains("balance")) rebalancing_->restore(state.at("balance"));
   const std::vector<Real> volumes = body_volumes(*scene_);
   for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
     scene_->bodies[i].start_volume = state.at("start_volumes").at(i);

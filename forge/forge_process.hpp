@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "engine/process.hpp"
+#include "engine/rebalancing.hpp"
 #include "engine/remeshing.hpp"
 #include "forge/heat.hpp"
 #include "forge/known_errors.hpp"
@@ -62,6 +63,7 @@ class ForgeProcess final : public Process {
   Real planned_strain() const;
   Real volume_step() const;
   Real volume_change() const;
+  RebalancedScene rebalanced_scene();
   RemeshedScene remeshed_scene();
   void mesh_changed();
 
@@ -70,6 +72,7 @@ class ForgeProcess final : public Process {
   std::optional<Probes> probes_;
   ContactFlow flow_;
   std::optional<Remeshing> remeshing_;
+  std::optional<Rebalancing> rebalancing_;
   std::optional<KnownErrors> errors_;
   std::optional<TracerMotion> tracers_;
   std::optional<Heat> heat_;

@@ -44,14 +44,20 @@ FillingProcess::FillingProcess(const Communicator& comm, Mesh mesh, const Inject
 
 /// The scene must have its fields: call it after all other parts were added. It runs first.
 void FillingProcess::add_remeshing() {
-  const auto& settings = scene_.settings.common.remesh;
+  const CommonSections& common = scene_.settings.common;
+  if (Rebalancing::is_wanted(common.partition, scene_.comm)) {
+    const RebalancedScene shared = {&scene_.comm, &scene_.mesh, &scene_.fields, [this] { rebuild(); }};
+    rebalancing_ = std::make_unique<Rebalancing>(common.partition, shared);
+    order_.insert(order_.begin(), rebalancing_.get());
+  }
+  const auto& settings = common.remesh;
   if (!settings || !settings->active) return;
   RemeshedScene lent;
   lent.comm = &scene_.comm;
   lent.mesh = &scene_.mesh;
   lent.fields = &scene_.fields;
   lent.flow_field = "velocity";
-  lent.balances_by_cost = scene_.settings.common.partition.method == PartitionMethod::cost;
+  lent.balances_by_cost = common.partition.method == PartitionMethod::cost;
   lent.keep_volume = true;
   if (front_) {
     lent.before = [this] { front_->prepare_remesh(); };
@@ -333,6 +339,7 @@ nlohmann::json FillingProcess::save_state() const {
   if (flow_) state["flow"] = flow_->save();
   if (front_) state["front"] = front_->save();
   if (remeshing_) state["remeshing"] = remeshing_->save();
+  if (rebalancing_) state["balance"] = rebalancing_->save();
   return state;
 }
 
@@ -368,6 +375,7 @@ void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::
     front_->load(state.at("front"));
   }
   if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
+  if (rebalancing_ && state.contains("balance")) rebalancing_->restore(state.at("balance"));
 }
 
 }  // namespace malleus::inject

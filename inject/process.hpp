@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "engine/process.hpp"
+#include "engine/rebalancing.hpp"
 #include "engine/remeshing.hpp"
 #include "inject/filling.hpp"
 #include "inject/flow.hpp"
@@ -71,6 +72,7 @@ class FillingProcess final : public Process {
   FillingState state_;
   std::unique_ptr<Mixture> mixture_;
   std::unique_ptr<Remeshing> remeshing_;
+  std::unique_ptr<Rebalancing> rebalancing_;
   std::unique_ptr<Flow> flow_;
   std::unique_ptr<PrescribedFlow> prescribed_;
   std::unique_ptr<Front> front_;

@@ -161,7 +161,8 @@ void PartitionSettings::describe(Section& s) {
            {{"curve", PartitionMethod::curve}, {"scotch", PartitionMethod::scotch}, {"cost", PartitionMethod::cost}},
            "stretches of a space-filling curve, or least computing plus communication time (scotch is not built in)");
   s.choice("balance", balance, {{"counted", Balance::counted}, {"measured", Balance::measured}},
-           "weights counted, or taken from measured times (then the bytes of two runs differ)");
+           "work of elements and nodes counted, or shares by speeds measured in each increment (then the bytes of two "
+           "runs differ)");
 }
 
 }  // namespace malleus

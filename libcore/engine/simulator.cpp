@@ -105,9 +105,6 @@ void check_partition(const CommonSections& common, CaseReader& reader) {
   if (common.partition.method == PartitionMethod::scotch) {
     reader.fail("partition", "method", "scotch is not built in; cost and curve are");
   }
-  if (common.partition.balance == Balance::measured) {
-    reader.fail("partition", "balance", "measured is not modelled yet; counted is");
-  }
 }
 
 /// Rounding aside, no node of a scene that is revolved lies beyond its axis. Collective.

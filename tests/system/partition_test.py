@@ -185,9 +185,32 @@ normal = 0 0 1
             self.assertAlmostEqual(force / forces[0], 1, places=4)
 
     def test_choices_that_are_not_there_are_refused(self):
-        for choice in ("method = scotch", "balance = measured"):
-            result = run("forge", self.case(choice), self.folder / "out", check=False)
-            self.assert_refused(result, "[partition]", choice.split()[-1])
+        result = run("forge", self.case("method = scotch"), self.folder / "out", check=False)
+        self.assert_refused(result, "[partition]", "scotch")
+
+    def test_shares_by_measured_speeds_move_and_restart_without_a_trace_in_the_forces(self):
+        case = self.case("balance = measured")
+        whole, halves, one = (self.folder / name for name in ("whole", "halves", "one"))
+        result = run("forge", case, whole, ranks=3)
+        self.assertIn("not repeatable", result.stdout)
+        self.assertIn("balance: in increment 1", result.stdout)  # from the curve's shares to those of least cost
+        run("forge", case, halves, "--steps", "1", ranks=3)
+        run("forge", case, halves, "--restart", ranks=3)
+        run("forge", case, one, ranks=1)
+        for output in (halves, one):
+            self.assertEqual(len(history(output)), len(history(whole)))
+            self.assertAlmostEqual(history(output)[-1]["force_upper_z_N"] / history(whole)[-1]["force_upper_z_N"], 1,
+                                   places=4)
+
+    def test_shares_by_cost_are_made_again_after_a_restart_on_other_ranks(self):
+        case = self.case("method = cost")
+        output = self.folder / "out"
+        run("forge", case, output, "--steps", "1", ranks=1)
+        run("forge", case, output, "--restart", ranks=3)
+        whole = self.folder / "whole"
+        run("forge", case, whole, ranks=1)
+        self.assertAlmostEqual(history(output)[-1]["force_upper_z_N"] / history(whole)[-1]["force_upper_z_N"], 1,
+                               places=4)
 
 
 if __name__ == "__main__":
