@@ -14,6 +14,7 @@ import itertools
 import json
 import pathlib
 import re
+import resource
 import statistics
 import subprocess
 import sys
@@ -29,6 +30,12 @@ def environment():
     """What scripts/environment sets."""
     text = subprocess.run(["bash", "-c", f". '{ROOT}/scripts/environment' && env -0"], capture_output=True, check=True).stdout
     return dict(item.split("=", 1) for item in text.decode().split("\0") if "=" in item)
+
+
+def processor_seconds():
+    """Of all programs that this one has started and that ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def program_of(case_text):
@@ -65,12 +72,13 @@ class Trial:
 class Study:
     """A case and the place of its trials."""
 
-    def __init__(self, case, directory, ranks=1, binaries=None, repeat=1, settings=()):
+    def __init__(self, case, directory, ranks=1, binaries=None, repeat=1, settings=(), processor_time=False):
+        """processor_time: seconds are those of the processor, of all ranks, not of the wall: for a machine with other work."""
         self.case = pathlib.Path(case).resolve()
         if not self.case.exists():
             sys.exit(f"{case}: there is no such case")
         self.directory = pathlib.Path(directory).resolve()
-        self.ranks, self.repeat, self.common = ranks, repeat, list(settings)
+        self.ranks, self.repeat, self.common, self.processor_time = ranks, repeat, list(settings), processor_time
         self.program = pathlib.Path(binaries or ROOT / "build" / "bin") / program_of(self.case.read_text())
         if not self.program.exists():
             sys.exit(f"{self.program}: not built; run scripts/build first")
@@ -78,7 +86,7 @@ class Study:
     def stamp(self, settings):
         """What decides whether a folder holds this very trial."""
         inputs = [self.case.read_bytes(), self.program.read_bytes()]
-        return {"settings": sorted([*self.common, *settings]), "ranks": self.ranks, "repeat": self.repeat,
+        return {"settings": sorted([*self.common, *settings]), "ranks": self.ranks, "repeat": self.repeat, "processor_time": self.processor_time,
                 "inputs": hashlib.sha256(b"".join(inputs)).hexdigest()}
 
     def command(self, settings, output):
@@ -102,10 +110,12 @@ class Study:
             return known
         output, seconds = self.directory / name, []
         for _ in range(self.repeat):
+            before = processor_seconds()
             finished = subprocess.run(self.command(settings, output), capture_output=True, text=True, env=environment())
             if finished.returncode != 0:
                 break
-            seconds.append(results.Run(output).summary["wall_s"])
+            spent = processor_seconds() - before
+            seconds.append(spent if self.processor_time else results.Run(output).summary["wall_s"])
         lines = [line for line in finished.stderr.splitlines() if line.startswith("error")]
         trial = Trial(name, list(settings), output, finished.returncode, (lines or [""])[0], seconds)
         output.mkdir(parents=True, exist_ok=True)

@@ -204,10 +204,12 @@ int Engine::solve_once() {
     finish("failed", exit_code::numerics);
     return exit_code::numerics;
   }
-  timed("estimate", [&] {
-    space_estimate_.prepare(process_);
-    space_estimate_.compare(process_, std::nullopt);
-  });
+  if (space_estimate_.is_asked_for()) {
+    timed("estimate", [&] {
+      space_estimate_.prepare(process_);
+      space_estimate_.compare(process_, std::nullopt);
+    });
+  }
   record(last_);
   finish("done", exit_code::done);
   return exit_code::done;
@@ -263,6 +265,7 @@ Increment Engine::next_increment() {
 
 /// Whether the coming increment will be repeated on coarser meshes: the first, and the first one past the middle.
 bool Engine::begin_estimate() {
+  if (!space_estimate_.is_asked_for()) return false;
   const bool is_halfway = !is_estimated_halfway_ && process_.solves_again() && progress() >= 0.5;
   if (last_.number > 0 && !is_halfway) return false;
   is_estimated_halfway_ = is_halfway;

@@ -45,6 +45,8 @@ class SpaceEstimate {
   /// without factory: never estimates.
   SpaceEstimate(const Communicator& comm, ProcessFactory factory) : comm_(comm), factory_(std::move(factory)) {}
 
+  bool is_asked_for() const { return static_cast<bool>(factory_); }
+
   /// Keeps the present state on meshes of twice and four times the sizes, ahead of an increment.
   void prepare(Process& process);
   /// After that increment (none: of a scene that was solved as it stands): does the same there, and compares.
