@@ -152,7 +152,9 @@ Real Loop::forcing(Real previous_norm) {
   }
   const Real wanted = options_.tolerance * report_.reference / report_.norm;
   if (forcing_ > wanted) return forcing_;  // more steps will follow
-  return std::clamp(options_.linear_tolerance * report_.reference / report_.norm, 1e-10, forcing_);
+  constexpr Real margin = 0.5;
+  const Real last = margin * std::min(options_.linear_tolerance, options_.tolerance);
+  return std::clamp(last * report_.reference / report_.norm, 1e-10, options_.largest_forcing);
 }
 
 /// Slope [W] of the potential along the step at a share of it; the state is put there.

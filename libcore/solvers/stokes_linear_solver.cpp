@@ -135,7 +135,7 @@ class StokesLinearSolver::Implementation {
 
   /// Iterations to spend with a set-up that was made for another system.
   int patience(Real residual, Real tolerance) const {
-    constexpr int least = 10;
+    constexpr int least = 5;
     const Real digits = std::log10(residual / tolerance);
     const Real expected = growth_allowed * setup_->iterations_per_digit * std::max(digits, 0.0);
     return std::min(options_.max_iterations, least + static_cast<int>(expected));

@@ -103,16 +103,18 @@ std::vector<Sphere> spread_spheres(int count, bool disjoint) {
     state = state * 1664525U + 1013904223U;
     return static_cast<Real>(state >> 8) / 16777216.0;
   };
+  // Apart from each other no more than some eight of full size have room.
+  const Real share = disjoint && count > 8 ? std::cbrt(8.0 / count) : 1;
   std::vector<Sphere> spheres;
   while (static_cast<int>(spheres.size()) < count) {
     Sphere sphere;
     for (Real& x : sphere.center) x = 0.15 + 0.7 * next();
-    sphere.radius = 0.05 + 0.08 * next();
+    sphere.radius = share * (0.05 + 0.08 * next());
     bool is_apart = true;
     for (const Sphere& other : spheres) {
       Real square = 0;
       for (std::size_t d = 0; d < 3; ++d) square += std::pow(sphere.center[d] - other.center[d], 2);
-      is_apart = is_apart && std::sqrt(square) > sphere.radius + other.radius + 0.07;
+      is_apart = is_apart && std::sqrt(square) > sphere.radius + other.radius + 0.07 * share;
     }
     if (is_apart || !disjoint) spheres.push_back(sphere);
   }

@@ -29,7 +29,8 @@ struct CavityOptions {
   Real penalty = 0;
 };
 
-/// `count` spheres of radius 0.05 to 0.13 in the unit box, always the same; apart from each other where `disjoint`.
+/// `count` spheres of radius 0.05 to 0.13 in the unit box, always the same; apart from each other where `disjoint`, and
+/// then smaller if there are more than 8.
 std::vector<Sphere> spread_spheres(int count, bool disjoint);
 
 /// A box of the unit size whose lid moves, 16 x (1-x) y (1-y) along x, with spheres of another viscosity. The

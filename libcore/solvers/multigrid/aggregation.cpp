@@ -8,22 +8,23 @@ namespace {
 
 constexpr LocalId none = -1;
 
-/// Squared strength of each entry, |A_ij|^2 / (m_i m_j), zero on diagonals and copies; found once, used in each pass.
+/// Squared strength of each entry, |A_ij|^2 / (m_i m_j), zero on diagonals; found once, used in each pass.
 class Strength {
  public:
-  Strength(const BlockGraph& graph, const BlockValues<Real>& values, int dim)
+  Strength(const BlockLayout& layout, const BlockGraph& graph, const BlockValues<Real>& values, int dim)
       : graph_(graph), squares_(static_cast<std::size_t>(graph.entries())) {
     // In double precision: with viscosities of 1e-8, the products of squares are below what single precision holds.
-    std::vector<Real> largest(static_cast<std::size_t>(graph.rows()), 0);
+    std::vector<Real> largest(static_cast<std::size_t>(layout.size()), 0);
     for (LocalId row = 0; row < graph.rows(); ++row) {
       for (LocalId k = begin(row); k < end(row); ++k) {
         if (column(k) != row) largest[index(row)] = std::max(largest[index(row)], norm_squared(values, k, dim));
       }
     }
+    layout.halo.update_copies(std::span(largest), 1);
     for (LocalId row = 0; row < graph.rows(); ++row) {
       for (LocalId k = begin(row); k < end(row); ++k) {
         const LocalId j = column(k);
-        if (j == row || j >= graph.rows()) continue;
+        if (j == row) continue;
         const Real scale = std::sqrt(largest[index(row)]) * std::sqrt(largest[index(j)]);
         if (scale > 0) squares_[index(k)] = static_cast<float>(norm_squared(values, k, dim) / scale);
       }
@@ -63,12 +64,26 @@ class Aggregator {
     form_whole_neighbourhoods();
     join_strongest_neighbour();
     gather_the_rest();
-    return {std::move(of_node_), count_};
+    return {std::move(of_node_), count_, find_strong()};
   }
 
  private:
+  bool is_above_threshold(LocalId entry) const {
+    return strength_.square(entry) >= least_ && strength_.square(entry) > 0;
+  }
+  /// With a node of this rank: aggregates do not reach beyond.
   bool is_strong(LocalId entry) const {
-    return strength_.square(entry) >= least_ && strength_.square(entry) > 0 && !is_left_out(strength_.column(entry));
+    const LocalId column = strength_.column(entry);
+    return column < rows_ && is_above_threshold(entry) && !is_left_out(column);
+  }
+  std::vector<bool> find_strong() const {
+    std::vector<bool> strong;
+    for (LocalId row = 0; row < rows_; ++row) {
+      for (LocalId k = strength_.begin(row); k < strength_.end(row); ++k) {
+        strong.push_back(strength_.column(k) == row || is_above_threshold(k));
+      }
+    }
+    return strong;
   }
   bool is_left_out(LocalId node) const { return left_out_[static_cast<std::size_t>(node)]; }
   bool is_pending(LocalId node) const { return aggregate_of(node) == none && !is_left_out(node); }
@@ -128,9 +143,9 @@ class Aggregator {
 
 }  // namespace
 
-Aggregates aggregate(const BlockGraph& graph, const BlockValues<Real>& values, int dim, Real threshold,
-                     const std::vector<bool>& left_out) {
-  const Strength strength(graph, values, dim);
+Aggregates aggregate(const BlockLayout& layout, const BlockGraph& graph, const BlockValues<Real>& values, int dim,
+                     Real threshold, const std::vector<bool>& left_out) {
+  const Strength strength(layout, graph, values, dim);
   return Aggregator(graph, strength, threshold, left_out).run();
 }
 

@@ -83,19 +83,20 @@ void fill_modes(int dim, const Real* offset, bool rigid, Eigen::Ref<Eigen::Matri
 class CoarseSpaceBuilder {
  public:
   CoarseSpaceBuilder(const Communicator& comm, const MultigridLevel& level, const Aggregates& aggregates,
-                     const Ownership& coarse, int dim, bool rigid)
+                     const Ownership& coarse, int dim, bool rigid, const NodeConstraints* constraints)
       : comm_(comm),
         level_(level),
         aggregates_(aggregates),
         coarse_(coarse),
         dim_(dim),
         rigid_(rigid),
+        constraints_(constraints),
         modes_(coarse_modes(dim, rigid)),
         first_(comm.sum_of_lower_ranks(static_cast<GlobalId>(aggregates.count))) {}
 
-  CoarseSpace run(const NodeConstraints* constraints) {
+  CoarseSpace run() {
     place_aggregates();
-    make_tentative(constraints);
+    make_tentative();
     with_blocks(level_.values.rows, modes_, [&](auto rows, auto columns) { smooth<rows, columns>(); });
     move_points();
     result_.scale = scale_;
@@ -132,9 +133,43 @@ class CoarseSpaceBuilder {
   }
 
   Real* centroid(LocalId node) { return centroids_.data() + index(aggregate_of(node)) * index(dim_); }
+  const Real* centroid(LocalId node) const { return centroids_.data() + index(aggregate_of(node)) * index(dim_); }
+
+  /// The modes of the aggregate of `member` (owned) at `node` (owned or copy).
+  void fill_modes_at(LocalId node, LocalId member, Eigen::Ref<Eigen::MatrixXd> modes) const {
+    std::array<Real, 3> offset{};
+    for (int d = 0; d < dim_; ++d) {
+      offset[index(d)] = (points_[index(node) * index(dim_) + index(d)] - centroid(member)[d]) / scale_;
+    }
+    fill_modes(dim_, offset.data(), rigid_, modes);
+    for (Eigen::Index r = dim_; r < modes.rows(); ++r) modes(r, r) = level_.scale / scale_;
+    if (projectors_.empty()) return;
+    const Eigen::Map<const Eigen::MatrixXd> projector(projectors_.data() + index(node) * index(dim_ * dim_), dim_,
+                                                      dim_);
+    modes = (projector * modes).eval();
+  }
+
+  /// Of the constraints, for owned nodes and copies. The copies are not the mesh's: contact couples more.
+  void find_projectors() {
+    if (constraints_ == nullptr) return;
+    const auto size = index(dim_ * dim_);
+    projectors_.assign(index(level_.layout.size()) * size, 0.0);
+    for (LocalId node = 0; node < level_.graph.rows(); ++node) {
+      for (int d = 0; d < dim_; ++d) {
+        Real* column = projectors_.data() + index(node) * size + index(d * dim_);
+        column[d] = 1;
+        constraints_->project(node, column);
+      }
+    }
+    level_.layout.halo.update_copies(std::span(projectors_), dim_ * dim_);
+  }
 
   /// The modes at each node, and the global number of its aggregate, for owned nodes and copies.
-  void make_tentative(const NodeConstraints* constraints) {
+  void make_tentative() {
+    points_ = level_.points;
+    points_.resize(index(level_.layout.size()) * index(dim_));
+    level_.layout.halo.update_copies(std::span(points_), dim_);
+    find_projectors();
     const int block = level_.values.rows;
     const auto size = index(block) * index(modes_);
     tentative_.assign(index(level_.layout.size()) * size, 0.0);
@@ -142,14 +177,8 @@ class CoarseSpaceBuilder {
     for (LocalId node = 0; node < level_.graph.rows(); ++node) {
       if (aggregate_of(node) < 0) continue;
       number_[index(node)] = first_ + aggregate_of(node);
-      std::array<Real, 3> offset{};
-      for (int d = 0; d < dim_; ++d) {
-        offset[index(d)] = (level_.points[index(node) * index(dim_) + index(d)] - centroid(node)[d]) / scale_;
-      }
       Eigen::Map<Eigen::MatrixXd> modes(tentative_.data() + index(node) * size, block, modes_);
-      fill_modes(dim_, offset.data(), rigid_, modes);
-      for (int r = dim_; r < block; ++r) modes(r, r) = level_.scale / scale_;
-      for (int c = 0; constraints != nullptr && c < modes_; ++c) constraints->project(node, modes.col(c).data());
+      fill_modes_at(node, node, modes);
     }
     level_.layout.halo.update_copies(std::span(tentative_), static_cast<int>(size));
     level_.layout.halo.update_copies(std::span(number_), 1);
@@ -171,7 +200,7 @@ class CoarseSpaceBuilder {
     if (level_.left_out[index(row)]) return;
     for (LocalId k = level_.graph.offsets[index(row)]; k < level_.graph.offsets[index(row) + 1]; ++k) {
       const LocalId column = column_[index(level_.graph.columns[index(k)])];
-      if (column >= 0) columns.push_back(column);
+      if (column >= 0 && aggregates_.strong[index(k)]) columns.push_back(column);
     }
     std::sort(columns.begin(), columns.end());
     columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
@@ -204,9 +233,12 @@ class CoarseSpaceBuilder {
     for (LocalId k = level_.graph.offsets[index(row)]; k < level_.graph.offsets[index(row) + 1]; ++k) {
       const LocalId j = level_.graph.columns[index(k)];
       if (column_[index(j)] < 0) continue;
-      const auto place = place_in_row(columns.data(), std::ssize(columns), column_[index(j)]);
-      BlockView<B, C>(blocks + place * B * C).noalias() +=
-          ConstBlockView<B>(level_.values.at(k)) * ConstBlockView<B, C>(tentative_.data() + index(j) * B * C);
+      const bool is_strong = aggregates_.strong[index(k)];
+      const LocalId column = column_[index(is_strong ? j : row)];
+      Block<B, C> modes = ConstBlockView<B, C>(tentative_.data() + index(j) * B * C);
+      if (!is_strong) fill_modes_at(j, row, modes);
+      const auto place = place_in_row(columns.data(), std::ssize(columns), column);
+      BlockView<B, C>(blocks + place * B * C).noalias() += ConstBlockView<B>(level_.values.at(k)) * modes;
     }
     const Block<B> scaling = -omega * ConstBlockView<B>(level_.inverses.data() + index(row) * B * B);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -239,9 +271,12 @@ class CoarseSpaceBuilder {
   const Ownership& coarse_;
   int dim_;
   bool rigid_;
+  const NodeConstraints* constraints_;
   int modes_;
   GlobalId first_;
   Real scale_ = 1;
+  std::vector<Real> points_;      ///< [node][dim], copies too
+  std::vector<Real> projectors_;  ///< [node][dim][dim], copies too; empty on coarse levels
   std::vector<Real> centroids_;   ///< [aggregate][dim]
   std::vector<Real> tentative_;   ///< [node][modes][block], copies too
   std::vector<GlobalId> number_;  ///< [node] global number of the aggregate, -1 = none
@@ -278,7 +313,7 @@ void estimate_largest_eigenvalue(const Communicator& comm, MultigridLevel& level
 
 CoarseSpace make_coarse_space(const Communicator& comm, const MultigridLevel& level, const Aggregates& aggregates,
                               const Ownership& coarse, int dim, bool rigid, const NodeConstraints* constraints) {
-  return CoarseSpaceBuilder(comm, level, aggregates, coarse, dim, rigid).run(constraints);
+  return CoarseSpaceBuilder(comm, level, aggregates, coarse, dim, rigid, constraints).run();
 }
 
 }  // namespace malleus

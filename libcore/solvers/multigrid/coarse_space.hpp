@@ -41,8 +41,10 @@ void invert_diagonals(MultigridLevel& level);
 void estimate_largest_eigenvalue(const Communicator& comm, MultigridLevel& level);
 
 /// Points [coarse owned][dim] of the aggregates and their scale, and P = (I - omega D^-1 A) P0 with omega = 4/(3
-/// lambda): P0 the modes on aggregates. coarse: ownership of the aggregates, numbered rank after rank.
-/// constraints: of the level's nodes, owned and copies; null on coarse levels. Collective.
+/// lambda): P0 the modes on aggregates. Where i and j are coupled weakly, A_ij meets the modes of i's aggregate at j in
+/// place of those of j's (Vanek's filtered matrix, made to keep rotations as well): on flattened elements the coarse
+/// rows stay short. coarse: ownership of the aggregates, numbered rank after rank.
+/// constraints: of the level's owned nodes, more do no harm; null on coarse levels. Collective.
 struct CoarseSpace {
   Prolongator prolongator;
   std::vector<Real> points;  ///< [coarse owned][dim]

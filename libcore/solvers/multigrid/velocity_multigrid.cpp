@@ -150,7 +150,7 @@ class SmoothedAggregation final : public VelocityMultigrid {
   bool coarsen(MultigridLevel& level, Real threshold, const NodeConstraints* constraints, MultigridLevel& next,
                Prolongator& prolongator) {
     if (level.left_out.empty()) level.left_out.assign(index(level.graph.rows()), false);
-    const Aggregates aggregates = aggregate(level.graph, level.values, dim_, threshold, level.left_out);
+    const Aggregates aggregates = aggregate(level.layout, level.graph, level.values, dim_, threshold, level.left_out);
     const GlobalId total = comm_.sum(static_cast<GlobalId>(aggregates.count));
     if (total == 0 || 10 * total > 8 * summary_.back().nodes) return false;
     estimate_largest_eigenvalue(comm_, level);
