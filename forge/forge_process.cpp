@@ -139,7 +139,7 @@ std::vector<std::string> ForgeProcess::accuracy_settings() const {
 
 Forecast ForgeProcess::forecast() const {
   // Measured on small scenes: seconds per node and Newton iteration, iterations an increment, bytes per node.
-  constexpr Real seconds_per_node = 4e-4;
+  constexpr Real seconds_per_node = 4e-5;
   constexpr Real iterations = 4;
   constexpr Real bytes_per_node = 12e3;
   Forecast forecast;

@@ -10,8 +10,10 @@ namespace malleus::inject {
 namespace {
 
 // Seconds of one core a node, measured on the housing at draft and on the channel at standard.
-constexpr Real of_a_solve = 90e-6;
-constexpr Real of_a_substep = 4e-6;
+constexpr Real of_a_solve_3d = 90e-6;
+constexpr Real of_a_solve_2d = 9e-6;
+constexpr Real of_a_substep_3d = 4e-6;
+constexpr Real of_a_substep_2d = 0.6e-6;
 constexpr Real newton_solves = 5;  ///< of a nonlinear flow
 constexpr Real unreached = 1e300;
 constexpr Real fastest_to_mean = 2;  ///< substeps follow the fastest fluid, the stride the front as a whole
@@ -100,6 +102,8 @@ Forecast forecast_filling(const Scene& scene, Real way, Real stride, bool solves
   const auto nodes = static_cast<Real>(scene.mesh.total_nodes());
   const auto ranks = static_cast<Real>(scene.comm.size());
   const Real solves_each = is_linear ? 1 : newton_solves;
+  const Real of_a_solve = scene.mesh.dim == 3 ? of_a_solve_3d : of_a_solve_2d;
+  const Real of_a_substep = scene.mesh.dim == 3 ? of_a_substep_3d : of_a_substep_2d;
   Forecast forecast;
   forecast.memory_bytes = 60e6 * ranks + nodes * (solves_flow ? 7000 : 1500);
   forecast.wall_s = solves_flow ? of_a_solve * solves_each * nodes / ranks : 0;
