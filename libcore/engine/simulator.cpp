@@ -14,6 +14,7 @@
 #include "engine/engine.hpp"
 #include "engine/load_mesh.hpp"
 #include "engine/run_guarded.hpp"
+#include "engine/stop_request.hpp"
 #include "engine/targets.hpp"
 #include "partition/balance.hpp"
 #include "remesh/distributed.hpp"
@@ -227,6 +228,7 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
 
 int run_simulator(int argc, char** argv, Simulator& simulator) {
   return run_guarded(argc, argv, [&](const Communicator& comm, const std::vector<std::string>& arguments) {
+    listen_for_stop_signals();
     const CommandLine line = parse_command_line(simulator.program(), simulator.description(), arguments);
     log::start(comm.is_root(), line.quiet     ? log::Level::quiet
                                : line.verbose ? log::Level::verbose

@@ -47,12 +47,16 @@ std::string signal_name(GlobalId number) {
 
 }  // namespace
 
-StopRequest::StopRequest() {
-  received_signal = 0;
+void listen_for_stop_signals() {
   for (const int number : stop_signals) std::signal(number, on_signal);
 }
 
+StopRequest::StopRequest() {
+  listen_for_stop_signals();
+}
+
 StopRequest::~StopRequest() {
+  received_signal = 0;
   for (const int number : stop_signals) std::signal(number, SIG_DFL);
 }
 

@@ -35,6 +35,8 @@ friction = 0.5
 [remesh]
 size = 0.12
 every = 7
+[accuracy]
+two_meshes = no
 [output]
 every = 3
 [checkpoint]
@@ -65,6 +67,8 @@ group = cavity_x_high
 group = cavity_y_low
 [wall.upper]
 group = cavity_y_high
+[accuracy]
+two_meshes = no
 [output]
 every = 3
 [checkpoint]

@@ -65,8 +65,8 @@ class LongRuns(unittest.TestCase):
     def assert_same_digits(self, one, other):
         self.assertEqual(digits(one), digits(other))
 
-    def assert_near(self, one, other, tolerance=1e-3):
-        """Last rows agree in all that a solver's tolerance bounds."""
+    def assert_near(self, one, other, tolerance=1e-2):
+        """Last rows agree as far as they can: on other ranks the meshes that are made anew are others."""
         a, b = (dict(zip(rows[0], rows[-1])) for rows in (digits(one), digits(other)))
         for column in ("time_s", "volume_m3", "force_upper_y_N", "fill_fraction", "pressure_gate_Pa"):
             if column in a:
@@ -76,7 +76,7 @@ class LongRuns(unittest.TestCase):
 class Kills(LongRuns):
     def test_killed_runs_go_on_to_the_same_digits(self):
         for program in PROGRAMS:
-            dice = random.Random(program)
+            dice = random.Random(program)  # the same moments, as far as a machine repeats them
             case = write_case(program, self.directory, self.INCREMENTS)
             whole = self.run_to_end(program, case, f"{program}-whole", ranks=2)
             output = self.directory / f"{program}-killed"
