@@ -325,6 +325,7 @@ void ContactFlow::rest() {
   std::fill(state_.nodes.begin(), state_.nodes.end(), 0.0);
   contact_.points().clear();
   tractions_.clear();
+  slips_.clear();
   gaps_.clear();
   memory_.clear();
   has_contacts_ = false;

@@ -9,6 +9,14 @@
 
 namespace malleus::forge {
 
+/// Powers at an increment's solve, W: imposed + tools + loads = deformation + contact.
+struct PowerReport {
+  Real imposed = 0;      ///< by velocities on boundaries
+  Real tools = 0;        ///< by tools, on the bodies
+  Real deformation = 0;  ///< of the viscous stress
+  Real contact = 0;      ///< of friction, and of what the penalty lets through
+};
+
 /// What an increment's solves took and left, for history.csv.
 struct FlowReport {
   int newton_iterations = 0;            ///< of the solve that gives forces and fields
@@ -16,9 +24,11 @@ struct FlowReport {
   std::vector<Vector> tool_forces;      ///< [tool] N, on it
   std::vector<Vector> body_forces;      ///< [region] N, on it as a master
   std::vector<Vector> boundary_forces;  ///< [boundary] N, on what imposes it
-  Real force_imbalance = 0;             ///< sum of the forces that are left over, relative to the largest one
-  Real max_penetration = 0;             ///< m, at the end of the increment as the conditions see it
-  int contacts = 0;                     ///< active contact points
+  std::vector<Real> contact_areas;      ///< [tool, then pair] m^2 under pressure
+  PowerReport power;
+  Real force_imbalance = 0;  ///< sum of the forces that are left over, relative to the largest one
+  Real max_penetration = 0;  ///< m, at the end of the increment as the conditions see it
+  int contacts = 0;          ///< active contact points
 };
 
 /// A surface node that touches what it faced in an increment's solve, for the heat that crosses and that friction
@@ -59,7 +69,7 @@ class ContactFlow final : public Component {
 
   const FlowReport& report() const noexcept { return report_; }
   const FlowTotals& totals() const noexcept { return totals_; }
-  /// Of the last solve: points under pressure, and those whose gap is closed. Filled where the scene has heat.
+  /// Of the last solve: points under pressure, and those whose gap is closed.
   const std::vector<Touching>& touching() const noexcept { return touching_; }
   /// Whether advance() fills the stress field, of the same state and mesh as velocity and pressure.
   void set_keeps_stress(bool keeps) { keeps_stress_ = keeps; }
@@ -130,6 +140,7 @@ class ContactFlow final : public Component {
   Real surprise(const Stage& stage, const FreeSurface& surface);
   void note_touching(const Stage& stage, const FreeSurface& surface);
   void measure_forces();
+  void measure_powers(std::span<const Real> reactions);
   void store_fields();
   void measure_rates();
   Vector position_at_end(const Stage& stage, LocalId node) const;
@@ -145,6 +156,7 @@ class ContactFlow final : public Component {
   StokesState state_;
   std::vector<ContactMemory> memory_;         ///< sorted by slave, opponent
   std::vector<ContactTraction> tractions_;    ///< [contact point] at the solution
+  std::vector<Vector> slips_;                 ///< [contact point] m/s, likewise
   std::vector<Real> gaps_;                    ///< [contact point] m, at the end of the increment
   std::unique_ptr<NodeSpace> contact_space_;  ///< with the masters of this rank's slaves
   std::vector<Touching> touching_;

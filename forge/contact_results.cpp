@@ -61,13 +61,14 @@ bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface
 
   const Real effective_step = stage.displacement.step * stage.displacement.now;
   tractions_.clear();
+  slips_.clear();
   gaps_.clear();
   memory_.clear();
   Real deepest = 0;        // m
   Real deepest_share = 0;  // of an edge
   GlobalId active = 0;
   for (const ContactPoint& point : contact_.points()) {
-    const Vector slip = contact_.slip(point, space, unknowns);
+    const Vector& slip = slips_.emplace_back(contact_.slip(point, space, unknowns));
     const ContactTraction& traction = tractions_.emplace_back(ContactTerm::traction(point, slip));
     gaps_.push_back(-effective_step * (point.normal.offset - point.normal.normal.dot(slip)));
     if (!(traction.pressure > 0)) continue;
@@ -166,7 +167,6 @@ Real ContactFlow::surprise(const Stage& stage, const FreeSurface& surface) {
 
 void ContactFlow::note_touching(const Stage& stage, const FreeSurface& surface) {
   touching_.clear();
-  if (!scene_.thermal) return;
   const auto components = static_cast<std::size_t>(scene_.dim() + 1);
   std::vector<Real> unknowns(static_cast<std::size_t>(contact_space_->nodes()) * components, 0.0);
   std::copy_n(state_.nodes.begin(), static_cast<std::size_t>(contact_space_->owned()) * components, unknowns.begin());
@@ -212,6 +212,7 @@ void ContactFlow::measure_forces() {
     }
   }
   scene_.comm->sum_in_place(sums);
+  measure_powers(reactions);
   const auto vector_at = [&](std::size_t i) { return to_vector(sums.data() + 3 * i, 3); };
   report_.tool_forces.clear();
   report_.body_forces.clear();
@@ -226,6 +227,32 @@ void ContactFlow::measure_forces() {
   }
   for (const Vector& force : report_.tool_forces) largest = std::max(largest, force.norm());
   report_.force_imbalance = largest > 0 ? vector_at(tools + bodies).norm() / largest : 0;
+}
+
+void ContactFlow::measure_powers(std::span<const Real> reactions) {
+  const auto dim = static_cast<std::size_t>(scene_.dim());
+  const std::size_t opponents = scene_.tools.size() + scene_.pairs.size();
+  std::vector<Real> sums(opponents + 3, 0.0);  // areas; powers imposed, of tools, of contacts
+  for (std::size_t i = 0; i < contact_.points().size(); ++i) {
+    const ContactPoint& point = contact_.points()[i];
+    const ContactTraction& traction = tractions_[i];
+    if (traction.pressure > 0) sums[static_cast<std::size_t>(point.opponent)] += point.area;
+    sums[opponents + 1] += point.area * traction.traction.dot(point.opponent_velocity);
+    sums[opponents + 2] -= point.area * traction.traction.dot(slips_[i]);
+  }
+  for (LocalId node = 0; node < scene_.mesh.owned_nodes() && scene_.progress.was_pushed; ++node) {
+    sums[opponents] +=
+        to_vector(reactions.data() + static_cast<std::size_t>(node) * dim, scene_.dim()).dot(velocity_of(node));
+  }
+  scene_.comm->sum_in_place(sums);
+  report_.contact_areas.assign(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(opponents));
+  report_.power.imposed = sums[opponents];
+  report_.power.tools = sums[opponents + 1];
+  report_.power.contact = sums[opponents + 2];
+  report_.power.deformation = 0;
+  if (!scene_.progress.was_pushed) return;
+  operator_->update_viscosity(state_);
+  report_.power.deformation = operator_->dissipation(state_);
 }
 
 void ContactFlow::store_fields() {

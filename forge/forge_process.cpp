@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "base/error.hpp"
+#include "forge/forge_budget.hpp"
+#include "mesh/simplex.hpp"
 
 namespace malleus::forge {
 namespace {
@@ -47,6 +49,17 @@ HeatTotals heat_totals(const nlohmann::json& json) {
   return {json.at("stored_J"), json.at("dissipated_J"), json.at("friction_J"), json.at("imposed_J"), json.at("lost_J")};
 }
 
+nlohmann::json work_json(const PowerReport& work) {
+  return {{"imposed_J", work.imposed},
+          {"tools_J", work.tools},
+          {"deformation_J", work.deformation},
+          {"contact_J", work.contact}};
+}
+
+PowerReport work_of(const nlohmann::json& json) {
+  return {json.at("imposed_J"), json.at("tools_J"), json.at("deformation_J"), json.at("contact_J")};
+}
+
 /// Whether an output or a probe shows the field.
 bool is_recorded(const CommonSections& common, const std::string& field) {
   const auto shows = [&](const std::vector<std::string>& names) {
@@ -59,7 +72,7 @@ bool is_recorded(const CommonSections& common, const std::string& field) {
 }  // namespace
 
 ForgeProcess::ForgeProcess(const ForgeCase& forge_case, std::unique_ptr<Scene> scene)
-    : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), motion_(*scene_, flow_) {
+    : case_(forge_case), scene_(std::move(scene)), flow_(*scene_), folds_(*scene_), motion_(*scene_, flow_) {
   if (case_.common.remesh && case_.common.remesh->active) remeshing_.emplace(*case_.common.remesh, remeshed_scene());
   if (Rebalancing::is_wanted(case_.common.partition, *scene_->comm))
     rebalancing_.emplace(case_.common.partition, rebalanced_scene());
@@ -317,7 +330,10 @@ std::vector<std::string> ForgeProcess::history_columns() const {
   for (const Opponent& one : opponents()) {
     for (int c = 0; c < scene_->dim(); ++c) columns.push_back(fmt::format("force_{}_{}_N", one.name, "xyz"[c]));
     columns.push_back(fmt::format("stroke_{}_m", one.name));
+    if (one.kind != Opponent::Kind::boundary) columns.push_back(fmt::format("contact_area_{}_m2", one.name));
+    if (has_filling(one)) columns.push_back(fmt::format("filling_{}", one.name));
   }
+  columns.emplace_back("folds");
   if (heat_) {
     for (const Body& body : scene_->bodies) columns.push_back(fmt::format("temperature_{}_K", body.name));
     for (const char* name : {"min_temperature_K", "max_temperature_K"}) columns.emplace_back(name);
@@ -333,6 +349,7 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
   const Real stroke = leading_stroke().value_or(0);
   at_rest_ = stroke != last_stroke_ ? 0 : at_rest_ + 1;
   last_stroke_ = stroke;
+  sum_up_increment();
   max_penetration_ = std::max(max_penetration_, report.max_penetration);
   max_imbalance_ = std::max(max_imbalance_, report.force_imbalance);
   newton_total_ += report.newton_iterations;
@@ -344,7 +361,9 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
     const Vector force = force_on(one);
     for (int c = 0; c < scene_->dim(); ++c) row.emplace_back(force[c]);
     row.emplace_back(stroke_of(one));
+    for (const HistoryCell& cell : contact_cells(one)) row.push_back(cell);
   }
+  row.emplace_back(static_cast<Real>(folds_.folds().size()));
   if (heat_) {
     for (const Real temperature : body_temperatures(*scene_)) row.emplace_back(temperature);
   }
@@ -353,6 +372,71 @@ std::vector<HistoryCell> ForgeProcess::history_row() {
     for (const std::string& name : errors_->columns()) row.emplace_back(Real(errors.at(name)));
   }
   return row;
+}
+
+bool ForgeProcess::has_filling(const Opponent& opponent) const {
+  return opponent.kind == Opponent::Kind::tool && scene_->tools[opponent.index].area(false) > 0;
+}
+
+/// Area in contact, and of a tool with a surface file the share of its surface.
+std::vector<HistoryCell> ForgeProcess::contact_cells(const Opponent& opponent) const {
+  if (opponent.kind == Opponent::Kind::boundary) return {};
+  const std::vector<Real>& areas = flow_.report().contact_areas;
+  Real area = 0;
+  if (opponent.kind == Opponent::Kind::tool && opponent.index < areas.size()) area = areas[opponent.index];
+  for (std::size_t i = 0; opponent.kind == Opponent::Kind::body && i < scene_->pairs.size(); ++i) {
+    const std::size_t at = scene_->tools.size() + i;
+    const bool is_master = static_cast<std::size_t>(scene_->pairs[i].master) == opponent.index;
+    if (is_master && at < areas.size()) area += areas[at];
+  }
+  std::vector<HistoryCell> cells = {area};
+  if (has_filling(opponent)) {
+    cells.emplace_back(area / scene_->tools[opponent.index].area(scene_->geometry == Geometry::axisymmetric));
+  }
+  return cells;
+}
+
+/// Mean over the deformable bodies by volume, 1/s. Collective.
+Real ForgeProcess::mean_strain_rate() const {
+  const Mesh& mesh = scene_->mesh;
+  const auto rates = std::as_const(scene_->fields)[field_name::strain_rate].values();
+  std::array<Real, 2> sums = {0, 0};
+  with_dim(mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < mesh.elements(); ++e) {
+      const auto i = static_cast<std::size_t>(e);
+      if (!scene_->bodies[static_cast<std::size_t>(mesh.element_region[i])].is_deformable()) continue;
+      const Real volume = simplex_volume<D>(simplex_points<D>(mesh, e));
+      sums[0] += volume * rates[i];
+      sums[1] += volume;
+    }
+  });
+  scene_->comm->sum_in_place(sums);
+  return sums[1] > 0 ? sums[0] / sums[1] : 0;
+}
+
+/// What an increment adds to the sums of the run.
+void ForgeProcess::sum_up_increment() {
+  const Real dt = scene_->progress.time - last_time_;
+  last_time_ = scene_->progress.time;
+  const PowerReport& power = flow_.report().power;
+  work_.imposed += dt * power.imposed;
+  work_.tools += dt * power.tools;
+  work_.deformation += dt * power.deformation;
+  work_.contact += dt * power.contact;
+  largest_strain_step_ = std::max(largest_strain_step_, dt * mean_strain_rate());
+  folds_.look(scene_->progress.time, flow_.touching());
+}
+
+ErrorBudget ForgeProcess::error_budget() {
+  RunMeasures run;
+  run.largest_strain_step = largest_strain_step_;
+  run.volume_change = volume_change();
+  run.force_imbalance = max_imbalance_;
+  run.max_penetration = max_penetration_;
+  run.travel = std::max(leading_stroke().value_or(0), scene_->scale.speed * scene_->progress.time);
+  run.gives_step = case_.time.step.has_value();
+  return forge_error_budget(*scene_, run);
 }
 
 Real ForgeProcess::volume() const {
@@ -395,6 +479,12 @@ nlohmann::json ForgeProcess::accuracy() {
                          {"max_penetration_m", max_penetration_},
                          {"force_imbalance", max_imbalance_},
                          {"newton_iterations", newton_total_}};
+  json["work"] = work_json(work_);
+  if (!scene_->boundaries->has_loads()) {
+    const Real given = work_.imposed + work_.tools;
+    json["work"]["imbalance"] = given != 0 ? (given - work_.deformation - work_.contact) / std::abs(given) : 0;
+  }
+  json["folds"] = folds_.save();
   if (heat_) json["heat"] = heat_json(heat_->totals());
   if (errors_) json["errors"] = errors_->errors();
   return json;
@@ -424,6 +514,9 @@ nlohmann::json ForgeProcess::save_state() const {
   if (remeshing_) state["remeshing"] = remeshing_->save();
   if (heat_) state["heat"] = heat_json(heat_->totals());
   if (rebalancing_) state["balance"] = rebalancing_->save();
+  state["work"] = work_json(work_);
+  state["folds"] = folds_.save();
+  state["largest_strain_step"] = largest_strain_step_;
   for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
   for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
   return state;
@@ -453,6 +546,10 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   flow_.mesh_changed();
   flow_.set_rates(state.at("edge_rate"), state.at("strain_rate"));
   if (remeshing_ && state.contains("remeshing")) remeshing_->restore(state.at("remeshing"));
+  work_ = work_of(state.at("work"));
+  folds_.restore(state.at("folds"));
+  largest_strain_step_ = state.at("largest_strain_step");
+  last_time_ = progress.time;
   if (heat_ && state.contains("heat")) heat_->set_totals(heat_totals(state.at("heat")));
   if (rebalancing_ && state.contains("balance")) rebalancing_->restore(state.at("balance"));
   const std::vector<Real> volumes = body_volumes(*scene_);

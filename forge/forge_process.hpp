@@ -7,6 +7,7 @@
 #include "engine/process.hpp"
 #include "engine/rebalancing.hpp"
 #include "engine/remeshing.hpp"
+#include "forge/folds.hpp"
 #include "forge/heat.hpp"
 #include "forge/known_errors.hpp"
 #include "forge/motion.hpp"
@@ -40,6 +41,7 @@ class ForgeProcess final : public Process {
   LinearTotals linear_totals() const override;
   nlohmann::json accuracy() override;
   std::vector<std::string> closing_lines() override;
+  ErrorBudget error_budget() override;
   nlohmann::json save_state() const override;
   std::vector<Real> save_local() const override { return flow_.save_memory(); }
   void restore_local(std::span<const Real> saved) override { flow_.restore_memory(saved); }
@@ -64,6 +66,10 @@ class ForgeProcess final : public Process {
   Real volume_step() const;
   Real volume_change() const;
   RebalancedScene rebalanced_scene();
+  bool has_filling(const Opponent& opponent) const;
+  std::vector<HistoryCell> contact_cells(const Opponent& opponent) const;
+  Real mean_strain_rate() const;
+  void sum_up_increment();
   RemeshedScene remeshed_scene();
   void mesh_changed();
 
@@ -76,12 +82,16 @@ class ForgeProcess final : public Process {
   std::optional<KnownErrors> errors_;
   std::optional<TracerMotion> tracers_;
   std::optional<Heat> heat_;
+  FoldWatch folds_;
   Motion motion_;
   int last_newton_ = 0;
   Real last_stroke_ = 0;      ///< m, of the leading tool or boundary
   int at_rest_ = 0;           ///< increments since it last advanced
   Real max_penetration_ = 0;  ///< of the run, m
   Real max_imbalance_ = 0;
+  Real largest_strain_step_ = 0;  ///< mean over the bodies
+  Real last_time_ = 0;            ///< s, of the last row
+  PowerReport work_;              ///< J, of the run
   GlobalId newton_total_ = 0;
   GlobalId increments_ = 0;
 };

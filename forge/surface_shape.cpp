@@ -71,6 +71,15 @@ class Surface final : public ToolShape {
     return contact_at(point, tree_.closest(point, everywhere));
   }
 
+  Real area(bool is_revolved) const override {
+    Real sum = 0;
+    for (LocalId f = 0; f < set_.size(); ++f) {
+      const Real radius = 0.5 * (set_.corner(f, 0)[0] + set_.corner(f, 1)[0]);
+      sum += set_.area_normal(f).norm() * (is_revolved ? 2 * std::numbers::pi * std::abs(radius) : 1);
+    }
+    return sum;
+  }
+
   void contacts(const Vector& point, Real reach, std::vector<SurfaceContact>& found) const override {
     const ClosestFacet nearest_facet = tree_.closest(point, everywhere);
     const SurfaceContact first = contact_at(point, nearest_facet);

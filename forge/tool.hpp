@@ -37,6 +37,7 @@ class Tool {
   Press& press() noexcept { return press_; }
   const Press& press() const noexcept { return press_; }
   const ToolMotion& motion() const noexcept { return motion_; }
+  Real area(bool is_revolved) const { return shape_->area(is_revolved); }
   bool moves() const noexcept { return motion_.direction.squaredNorm() > 0 || motion_.rotation.squaredNorm() > 0; }
 
   /// Fixes the poses at the start and the end of the increment that starts at `time`, and the velocity at speed_time.

@@ -22,6 +22,13 @@ class ToolShape {
   /// The closest place of the surface.
   virtual SurfaceContact nearest(const Vector& point) const = 0;
 
+  /// Area of the surface [m^2]; in 2D its length [m], of a revolved scene the area of its revolution. 0: unlimited, or
+  /// no shape of which one asks.
+  virtual Real area(bool is_revolved) const {
+    (void)is_revolved;
+    return 0;
+  }
+
   /// Every face that holds the point: in a concave edge or corner two or three, elsewhere one. Those with a distance
   /// below `reach` [m] are added to `contacts`.
   virtual void contacts(const Vector& point, Real reach, std::vector<SurfaceContact>& contacts) const {
