@@ -12,7 +12,8 @@
 namespace malleus::forge {
 namespace {
 
-constexpr int most_searches = 4;        ///< of contact points in one solve, where tools are curved
+constexpr int most_searches = 4;  ///< of contact points in one solve, where tools are curved
+constexpr std::array<Real, 2> guess_tolerances = {3e-2, 1e-3};
 constexpr int most_passes = 12;         ///< of augmentation and friction limits
 constexpr int most_plans = 25;          ///< of a hydraulic press
 constexpr int tries_before_picard = 3;  ///< of an increment, each with half the step
@@ -245,6 +246,7 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
       return Outcome::done();
     }
     prepare_operator(stage);
+    if (const Outcome outcome = guess_limits(stage, surface); outcome.kind != Outcome::Kind::done) return outcome;
     for (int pass = 0;; ++pass) {
       if (const Outcome outcome = run_newton(scene_.solver.newton_tolerance); outcome.kind != Outcome::Kind::done)
         return outcome;
@@ -255,6 +257,18 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
     if (surprise(stage, surface) <= tolerated_surprise) return Outcome::done();
   }
   return Outcome::retry("nodes end within a tool");
+}
+
+/// Solutions that need not be exact, for better limits of friction: those of a first exact one would be wrong anyway.
+Outcome ContactFlow::guess_limits(const Stage& stage, const FreeSurface& surface) {
+  if (!has_limited_friction()) return Outcome::done();
+  for (const Real tolerance : guess_tolerances) {
+    if (tolerance <= scene_.solver.newton_tolerance) break;
+    if (const Outcome outcome = run_newton(tolerance); outcome.kind != Outcome::Kind::done) return outcome;
+    measure_contacts(stage, surface);
+    if (!update_friction(surface)) break;
+  }
+  return Outcome::done();
 }
 
 Vector ContactFlow::velocity_of(LocalId node) const {

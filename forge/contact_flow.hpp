@@ -134,7 +134,11 @@ class ContactFlow final : public Component {
   /// Slips of the contact points at the solution, and from them pressures, gaps and what is remembered. Whether the
   /// solution asks for another pass (augmentation; limits of friction that moved). Collective.
   bool update_contacts(const Stage& stage, const FreeSurface& surface, int pass);
+  /// The first part of that: slips, tractions, gaps, memory. The deepest penetration, as a share of an edge.
+  /// Collective.
+  Real measure_contacts(const Stage& stage, const FreeSurface& surface);
   bool update_friction(const FreeSurface& surface);
+  Outcome guess_limits(const Stage& stage, const FreeSurface& surface);
   bool update_rubbing(int pass);
   /// Largest depth at which a node ends within a tool that its linearised gap did not foresee, in edges. Collective.
   Real surprise(const Stage& stage, const FreeSurface& surface);

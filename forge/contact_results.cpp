@@ -52,7 +52,7 @@ std::vector<Real> ContactFlow::nodal_shear_stress() const {
   return stress;
 }
 
-bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface, int pass) {
+Real ContactFlow::measure_contacts(const Stage& stage, const FreeSurface& surface) {
   const auto components = static_cast<std::size_t>(scene_.dim() + 1);
   const NodeSpace& space = *contact_space_;
   std::vector<Real> unknowns(static_cast<std::size_t>(space.nodes()) * components, 0.0);
@@ -80,8 +80,13 @@ bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface
   }
   report_.contacts = static_cast<int>(scene_.comm->sum(active));
   report_.max_penetration = scene_.comm->max(deepest);
+  return scene_.comm->max(deepest_share);
+}
+
+bool ContactFlow::update_contacts(const Stage& stage, const FreeSurface& surface, int pass) {
+  const Real deepest_share = measure_contacts(stage, surface);
   bool again = false;
-  if (scene_.penalty.augmented && scene_.comm->max(deepest_share) > scene_.penalty.penetration) {
+  if (scene_.penalty.augmented && deepest_share > scene_.penalty.penetration) {
     for (std::size_t i = 0; i < tractions_.size(); ++i) {
       contact_.points()[i].normal.multiplier = tractions_[i].pressure;
     }

@@ -22,6 +22,7 @@ void BodySettings::describe(Section& s) {
       .exponent_is("rate_sensitivity", rate_sensitivity);
   s.real("viscosity", viscosity, "Pa.s", "of a newtonian body, in place of consistency").above(0);
   s.real("density", density, "kg/m^3", "for gravity and heat").above(0);
+  s.flag("remesh", remesh, "whether [remesh] makes its mesh anew; no for dies that hardly deform");
   s.real("conductivity", conductivity, "W/m/K", "with [thermal]").at_least(0);
   s.real("heat_capacity", heat_capacity, "J/kg/K",
          "with [thermal]; a rigid body without it keeps its temperature at the start")

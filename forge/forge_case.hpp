@@ -29,6 +29,7 @@ struct BodySettings {
   Real rate_sensitivity = 1;        ///< m
   std::optional<Real> viscosity;    ///< newtonian, Pa.s
   std::optional<Real> density;      ///< kg/m^3
+  bool remesh = true;               ///< with [remesh]: its mesh is made anew with the others
   // With [thermal]:
   std::optional<Real> conductivity;       ///< W/(m K)
   std::optional<Real> heat_capacity;      ///< J/(kg K)

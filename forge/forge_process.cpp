@@ -112,7 +112,12 @@ RemeshedScene ForgeProcess::remeshed_scene() {
   lent.flow_field = field_name::velocity;
   lent.balances_by_cost = case_.common.partition.method == PartitionMethod::cost;
   lent.keep_volume = true;
-  for (const Body& body : scene_->bodies) lent.kept_regions.push_back(body.is_deformable() ? 0 : 1);
+  for (const Body& body : scene_->bodies) {
+    const auto settings = std::find_if(case_.bodies.begin(), case_.bodies.end(),
+                                       [&](const BodySettings& one) { return one.name == body.name; });
+    const bool stays = settings != case_.bodies.end() && !settings->remesh;
+    lent.kept_regions.push_back(body.is_deformable() && !stays ? 0 : 1);
+  }
   lent.mesh_changed = [this] { mesh_changed(); };
   return lent;
 }

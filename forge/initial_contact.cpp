@@ -12,6 +12,9 @@ namespace {
 constexpr Real none = std::numeric_limits<Real>::max();
 /// Overlaps below this share of an edge come from rounding, of a size that no force shows.
 constexpr Real harmless_overlap = 1e-4;
+/// Gaps between bodies are looked for within this share of the scene's height: from afar a node meets the outer sides of
+/// the other body from behind.
+constexpr Real told_share = 0.25;
 /// Overlaps of so many edges look like a tool that is turned the wrong way.
 constexpr Real turned_overlap = 1;
 
@@ -56,7 +59,7 @@ Clearance of_pair(Scene& scene, const FreeSurface& surface, const BodyPair& pair
   Real least = none;
   LocalId closest = -1;
   for (const NodeFacetPair& met :
-       find_pairs(*scene.comm, surface, positions, {pair.slave, pair.master, scene.scale.height})) {
+       find_pairs(*scene.comm, surface, positions, {pair.slave, pair.master, told_share * scene.scale.height})) {
     if (met.gap >= least) continue;
     least = met.gap;
     closest = met.slave;
