@@ -55,9 +55,9 @@ struct NewtonOutcome {
 /// step is cut where the convex potential that the flow minimises (dissipation, contact, friction, at the step's new
 /// pressures) has risen again along it: a search on the norm of the residual stalls at m < 0.1. Linear solves are as
 /// exact as the progress warrants (Eisenstat and Walker 1996, choice 2), the last one to linear_tolerance of the whole.
-/// The tangent is consistent (see Tangent) near the solution, unless the linear solver needs symmetry. Measured on a block of 512
-/// triangles between sticking platens, from a cold start to 1e-6, cut-off 1e-2 V/H: 5, 7, 10, 12, 16 iterations at
-/// m = 0.5, 0.3, 0.1, 0.05, 0.02.
+/// The tangent is consistent (see Tangent) near the solution, unless the linear solver needs symmetry. Measured on a
+/// block of 512 triangles between sticking platens, from a cold start to 1e-6, cut-off 1e-2 V/H: 5, 7, 10, 12, 16
+/// iterations at m = 0.5, 0.3, 0.1, 0.05, 0.02.
 ///
 /// Terms with branches (contacts) are solved by an active set: each step is made with the branches of its start, from a
 /// warm start with those that the terms carry from the last increment; convergence is judged without that. Three bodies

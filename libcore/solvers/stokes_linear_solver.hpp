@@ -50,7 +50,7 @@ struct LinearOutcome {
 ///   -malleus_method block_triangular | gamg | gmres_ilu | conjugate_residual | direct
 ///   -malleus_modes automatic | translations | rigid
 ///   -malleus_precision automatic | single | double
-///   -malleus_threshold <strong couplings, 0.15>  -malleus_chebyshev_steps <3>  -malleus_restart <150 or 40>
+///   -malleus_threshold <strong couplings, 0.25>  -malleus_chebyshev_steps <3>  -malleus_restart <150 or 40>
 /// The choices made are said in the log's details, fallbacks as warnings.
 class StokesLinearSolver {
  public:
