@@ -4,6 +4,12 @@
 set(MALLEUS_MPI_LAUNCH ${MPIEXEC_EXECUTABLE} --oversubscribe --allow-run-as-root --bind-to none)
 set(MALLEUS_MPI_ENVIRONMENT
     "OMP_NUM_THREADS=1;OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1")
+if(CMAKE_BUILD_TYPE STREQUAL Sanitize)
+  # Leaks of Open MPI are told from ours by the name of their library, which must be there still at the end.
+  list(APPEND MALLEUS_MPI_ENVIRONMENT "LD_PRELOAD=${CMAKE_BINARY_DIR}/tests/libkeep_libraries.so"
+       "ASAN_OPTIONS=verify_asan_link_order=0"
+       "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/leaks.supp:print_suppressions=0")
+endif()
 
 function(malleus_unit_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES;RANKS" ${ARGN})
