@@ -28,13 +28,15 @@ Outcome Filling::advance(const Increment& increment) {
   }
   const Real gain = filled - state_.filled;
   const Real entered = state_.inflow() * increment.dt;
-  stands_still_ = entered > 0 && filled > 0.5 * scene_.cavity && gain < smallest_gain * entered;
+  stands_still_ =
+      !scene_.settings.common.air && entered > 0 && filled > 0.5 * scene_.cavity && gain < smallest_gain * entered;
   state_.filled = std::min(filled, scene_.cavity);
   const bool has_vents = !scene_.settings.vents.empty();
   pockets_ = find_air_pockets(scene_, fronts_);
   Real vented = 0;
   for (const AirPocket& pocket : pockets_) vented += pocket.is_vented ? pocket.volume : 0;
-  state_.is_closed = has_vents && (!fronts_.has_way_out() || vented < last_corners * scene_.cavity);
+  state_.is_closed =
+      has_vents && !scene_.settings.common.air && (!fronts_.has_way_out() || vented < last_corners * scene_.cavity);
   return Outcome::done();
 }
 

@@ -38,6 +38,7 @@ Flow::Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state
   scene_.fields.declare(scene_.mesh, {"pressure", "Pa", Support::node, 1, Transfer::interpolate, false});
   scene_.fields.declare(scene_.mesh, {"viscosity", "Pa.s", Support::element, 1, Transfer::interpolate, true});
   scene_.fields.declare(scene_.mesh, {"strain_rate", "1/s", Support::element, 1, Transfer::interpolate, true});
+  if (mixture.has_void()) void_.emplace(scene, fronts, mixture);
   rebuild();
 }
 
@@ -63,6 +64,7 @@ void Flow::rebuild() {
   operator_->leave_out_still_elements(true);
   linear_.reset();
   unknowns_ = {};
+  if (void_) void_->rebuild();
   scene_.subscale_velocity.clear();
   is_solved_ = false;
 }
@@ -71,7 +73,8 @@ void Flow::rebuild() {
 void Flow::refuse_blocked_vents() const {
   const bool is_imposed = std::any_of(scene_.settings.inlets.begin(), scene_.settings.inlets.end(),
                                       [](const InletSettings& inlet) { return !inlet.pressure; });
-  if (!is_imposed || scene_.settings.vents.empty() || fronts_.has_way_out()) return;
+  const bool air_yields = scene_.settings.common.air.has_value();
+  if (!is_imposed || scene_.settings.vents.empty() || air_yields || fronts_.has_way_out()) return;
   throw InputError(fmt::format(
       "[vent.{}] group: the flow from the inlets reaches no open part of a vent: they are covered at the start, or "
       "behind sections one element thin, where nothing flows; refine the mesh there or place other vents",
@@ -79,25 +82,26 @@ void Flow::refuse_blocked_vents() const {
 }
 
 void Flow::start() {
-  const Outcome outcome = solve(0);
+  const Outcome outcome = solve(0, 0);
   if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
 }
 
 void Flow::check_conditions() {
   refuse_blocked_vents();
   refresh_mixture();
-  prepare(asked_drives(scene_, 0), 0);
+  if (void_) void_->find(0);
+  prepare(asked_drives(scene_, 0), 0, 0);
 }
 
 Outcome Flow::solve_once() {
-  return is_solved_ && !is_asked_ ? Outcome::done() : solve(0);
+  return is_solved_ && !is_asked_ ? Outcome::done() : solve(0, 0);
 }
 
 Outcome Flow::advance(const Increment& increment) {
   state_.flow_updated = increment.number == 1;  // start() solved it for this increment
   ++state_.increments_since_flow;
   if (is_due(present_drives(increment.start()))) {
-    const Outcome outcome = solve(increment.start());
+    const Outcome outcome = solve(increment.start(), increment.dt);
     if (outcome.kind != Outcome::Kind::done) return outcome;
     state_.flow_updated = true;
   }
@@ -121,7 +125,7 @@ std::vector<GateDrive> Flow::present_drives(Real time) {
 }
 
 bool Flow::is_due(const std::vector<GateDrive>& drives) {
-  if (!is_solved_ || is_asked_) return true;
+  if (!is_solved_ || is_asked_ || std::isfinite(largest_step())) return true;
   for (std::size_t i = 0; i < drives.size(); ++i) {
     const GateDrive& present = state_.gates[i].drive;
     if (drives[i].kind != present.kind || drives[i].value != present.value) return true;
@@ -176,16 +180,17 @@ StickingNodes Flow::sticking_nodes() const {
   return sticks;
 }
 
-Outcome Flow::solve(Real time) {
+Outcome Flow::solve(Real time, Real dt) {
   refresh_mixture();
+  if (void_) void_->find(time);
   std::vector<GateDrive> drives = present_drives(time);
   const auto velocity = scene_.fields["velocity"].values();
   const std::vector<Real> old_velocity(velocity.begin(), velocity.end());
   const bool was_solved = is_solved_;
   // Where the front has moved, the hierarchy of the flow before wastes iterations; and no run depends on its past.
   linear_.reset();
-  Outcome outcome = solve_with(drives, time);
-  if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time);
+  Outcome outcome = solve_with(drives, time, dt);
+  if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time, dt);
   if (outcome.kind != Outcome::Kind::done) return outcome;
   if (was_solved) note_freezing(old_velocity);
   is_asked_ = false;
@@ -221,8 +226,9 @@ NewtonOptions Flow::newton_options() const {
   return options;
 }
 
-std::vector<std::size_t> Flow::prepare(const std::vector<GateDrive>& drives, Real time) {
+std::vector<std::size_t> Flow::prepare(const std::vector<GateDrive>& drives, Real time, Real dt) {
   FlowConditions conditions = make_conditions(scene_, mixture_, drives, sticking_nodes(), time);
+  if (void_) void_->add_to(conditions, dt);
   operator_->set_constraints(std::move(conditions.constraints));
   operator_->set_loads(std::move(conditions.loads));
   operator_->set_gates(std::move(conditions.gates));
@@ -231,8 +237,8 @@ std::vector<std::size_t> Flow::prepare(const std::vector<GateDrive>& drives, Rea
   return conditions.gate_inlets;
 }
 
-Outcome Flow::solve_with(const std::vector<GateDrive>& drives, Real time) {
-  const std::vector<std::size_t> gate_inlets = prepare(drives, time);
+Outcome Flow::solve_with(const std::vector<GateDrive>& drives, Real time, Real dt) {
+  const std::vector<std::size_t> gate_inlets = prepare(drives, time, dt);
   StokesState unknowns = is_solved_ ? unknowns_ : operator_->start_state();
   operator_->impose_constraints(unknowns);
   const NewtonOutcome newton = NewtonSolver(newton_options()).solve(*operator_, linear_, unknowns);
@@ -252,6 +258,15 @@ Outcome Flow::solve_with(const std::vector<GateDrive>& drives, Real time) {
   return Outcome::done();
 }
 
+/// Into the cavity through the inlets, m^3/s.
+Real Flow::inflow(std::span<const Real> velocity) const {
+  Real sum = 0;
+  for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
+    sum -= outflow(scene_, part->facets, velocity);
+  }
+  return sum;
+}
+
 void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::size_t>& gate_inlets) {
   const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
   const std::span<Real> velocity = scene_.fields["velocity"].values();
@@ -261,12 +276,13 @@ void Flow::publish(const std::vector<GateDrive>& drives, const std::vector<std::
     pressure[node] = unknowns_.nodes[node * (dim + 1) + dim];
   }
   extend_pressure(scene_.comm, scene_.mesh, operator_->viscosity(), operator_->force_density(), pressure);
+  if (void_) void_->fill(operator_->viscosity(), inflow(velocity), unknowns_);
   const std::span<Real> viscosity = scene_.fields["viscosity"].values();
   const std::span<Real> strain_rate = scene_.fields["strain_rate"].values();
   operator_->update_viscosity(unknowns_);
   for (std::size_t e = 0; e < viscosity.size(); ++e) {
     viscosity[e] = operator_->viscosity()[e];
-    strain_rate[e] = operator_->shear_rate()[e] / std::sqrt(3.0);
+    strain_rate[e] = viscosity[e] > 0 ? operator_->shear_rate()[e] / std::sqrt(3.0) : 0;
   }
   scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
   for (const BoundaryPart* part : scene_.parts_of(BoundaryPart::Kind::inlet)) {
@@ -295,7 +311,9 @@ void Flow::note_freezing(std::span<const Real> old_velocity) {
 }
 
 nlohmann::json Flow::save() const {
-  return {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}};
+  nlohmann::json saved = {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}};
+  if (void_) saved["void"] = void_->save();
+  return saved;
 }
 
 void Flow::load(const nlohmann::json& saved) {
@@ -313,7 +331,8 @@ void Flow::load(const nlohmann::json& saved) {
   refresh_mixture();
   std::vector<GateDrive> drives;
   for (const GateState& gate : state_.gates) drives.push_back(gate.drive);
-  prepare(drives, state_.time);
+  prepare(drives, state_.time, 0);
+  if (void_) void_->load(saved.at("void"));
   operator_->update_viscosity(unknowns_);
   scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
 }

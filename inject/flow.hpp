@@ -2,19 +2,22 @@
 
 /// The flow component: velocity and pressure of the fluids as the front lies now.
 
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "engine/component.hpp"
 #include "engine/process.hpp"
 #include "inject/filling_state.hpp"
 #include "inject/flow_conditions.hpp"
 #include "inject/front_set.hpp"
+#include "inject/void_model.hpp"
 #include "solvers/newton.hpp"
 
 namespace malleus::inject {
 
 /// Solves the Stokes equations for the mixture (paper, eq. [1] with [9]) when the front has moved far enough since the
-/// last solve, and keeps the flow in between. Fields: velocity, pressure, viscosity, strain_rate.
+/// last solve, and keeps the flow in between. Fields: velocity, pressure, viscosity, strain_rate. Void: see VoidModel.
 class Flow final : public Component {
  public:
   Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state);
@@ -37,6 +40,9 @@ class Flow final : public Component {
   /// Distance [elements] that freezing the flow between solves misplaced the front, summed over the solves: half of the
   /// time between two solves times the change of the normal velocity.
   Real freezing_error() const { return freezing_error_; }
+  /// Largest step [s] that trapped gas allows.
+  Real largest_step() const { return void_ ? void_->largest_step() : std::numeric_limits<Real>::infinity(); }
+  const VoidModel* void_model() const { return void_ ? &*void_ : nullptr; }
   nlohmann::json save() const;
   void load(const nlohmann::json& saved);
   /// What the last solve left, which may be some increments old: to go on from it with the same digits. Local.
@@ -51,12 +57,13 @@ class Flow final : public Component {
   bool is_due(const std::vector<GateDrive>& drives);
   bool dissipation_changed();
   void refuse_blocked_vents() const;
-  Outcome solve(Real time);
-  Outcome solve_with(const std::vector<GateDrive>& drives, Real time);
-  /// Makes the operator ready; returns the inlet of each flow-rate gate.
-  std::vector<std::size_t> prepare(const std::vector<GateDrive>& drives, Real time);
+  Outcome solve(Real time, Real dt);
+  Outcome solve_with(const std::vector<GateDrive>& drives, Real time, Real dt);
+  /// Makes the operator ready; returns the inlet of each flow-rate gate. dt: see VoidModel.
+  std::vector<std::size_t> prepare(const std::vector<GateDrive>& drives, Real time, Real dt);
   bool switch_over(std::vector<GateDrive>& drives);
   void publish(const std::vector<GateDrive>& drives, const std::vector<std::size_t>& gate_inlets);
+  Real inflow(std::span<const Real> velocity) const;
   void refresh_mixture();
   StickingNodes sticking_nodes() const;
   void note_freezing(std::span<const Real> old_velocity);
@@ -69,6 +76,7 @@ class Flow final : public Component {
   std::unique_ptr<StokesOperator> operator_;
   StokesLinearSolver linear_;
   StokesState unknowns_;
+  std::optional<VoidModel> void_;
   LinearTotals totals_;
   bool is_solved_ = false;
   bool is_asked_ = false;

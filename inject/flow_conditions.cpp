@@ -226,8 +226,9 @@ StokesLoads make_loads(const Scene& scene, const Mixture& mixture, const std::ve
   return loads;
 }
 
-/// Whether some part of the boundary lets fluid out under a pressure.
+/// Whether some part of the boundary lets fluid out under a pressure, or air that [air] describes gives way.
 bool has_opening(const Scene& scene, const std::vector<GateDrive>& drives) {
+  if (scene.settings.common.air) return true;
   for (const BoundaryPart& part : scene.parts) {
     if (part.kind == BoundaryPart::Kind::vent) return true;
     if (part.kind == BoundaryPart::Kind::inlet && drives[part.index].kind == GateDrive::Kind::pressure) return true;

@@ -14,6 +14,9 @@
 namespace malleus::inject {
 namespace {
 
+/// Share of an element below which it is empty, beside void.
+constexpr Real least_filled = 0.01;
+
 /// Edge of the regular simplex of that volume.
 Real element_size(int dim, Real volume) {
   return dim == 2 ? std::sqrt(4 / std::sqrt(3.0) * volume) : std::cbrt(6 * std::sqrt(2.0) * volume);
@@ -114,6 +117,26 @@ void Mixture::update(const Mesh& mesh, const std::vector<FluidLevelSet>& level_s
       for (const FluidLevelSet& level_set : level_sets) shares_[static_cast<std::size_t>(level_set.fluid)][e] /= sum;
     }
   });
+  if (has_void()) settle_void();
+}
+
+bool Mixture::has_void() const {
+  const Fluid& fluid = fluids_[static_cast<std::size_t>(background_)];
+  return fluids_.size() > 1 && !fluid.law && !fluid.is_given;
+}
+
+void Mixture::settle_void() {
+  std::vector<Real>& empty = shares_[static_cast<std::size_t>(background_)];
+  for (std::size_t e = 0; e < empty.size(); ++e) {
+    if (empty[e] <= 1 - least_filled) continue;
+    for (std::vector<Real>& share : shares_) share[e] = 0;
+    empty[e] = 1;
+  }
+  for (const auto& [element, fluid] : fed_) {
+    const auto e = static_cast<std::size_t>(element);
+    shares_[static_cast<std::size_t>(fluid)][e] += empty[e];
+    empty[e] = 0;
+  }
 }
 
 Real Mixture::density(LocalId element) const {

@@ -49,7 +49,14 @@ class Mixture final : public ViscosityModel {
   /// background: what fills the space outside all level sets.
   Mixture(std::vector<Fluid> fluids, int background, MixtureLaw law, Real thickness);
 
-  /// Shares from the level sets as they are. Where level sets overlap, shares are scaled to a sum of 1. Local.
+  /// Elements that hold one fluid whatever the level sets say (those at a gate), where the background is void: it could
+  /// not flow otherwise. Local.
+  void set_fed(std::vector<std::pair<LocalId, int>> fed) { fed_ = std::move(fed); }
+  /// Whether the background is not modelled.
+  bool has_void() const;
+
+  /// Shares from the level sets as they are. Where level sets overlap, shares are scaled to a sum of 1. Beside void, an
+  /// element of which less than 1 % is filled counts as empty. Local.
   void update(const Mesh& mesh, const std::vector<FluidLevelSet>& level_sets);
 
   std::span<const Real> shares(int fluid) const { return shares_[static_cast<std::size_t>(fluid)]; }  ///< [element]
@@ -63,6 +70,7 @@ class Mixture final : public ViscosityModel {
   bool is_linear() const override;
 
  private:
+  void settle_void();
   void evaluate_fluid(const Fluid& fluid, const Mesh& mesh, std::span<const Real> shear_rate, std::span<Real> viscosity,
                       std::span<Real> slope) const;
 
@@ -70,6 +78,7 @@ class Mixture final : public ViscosityModel {
   int background_;
   MixtureLaw law_;
   Real thickness_;
+  std::vector<std::pair<LocalId, int>> fed_;
   std::vector<std::vector<Real>> shares_;  ///< [fluid][element]
 };
 

@@ -142,6 +142,7 @@ std::vector<std::string> FillingProcess::output_fields() const {
   std::vector<std::string> names = {"velocity", "pressure", "viscosity", "strain_rate"};
   for (const std::string& name : fronts_.names()) names.push_back(name);
   names.emplace_back("fill_time");
+  if (has_gas()) names.emplace_back("air_pressure");
   return names;
 }
 
@@ -167,6 +168,7 @@ Real FillingProcess::largest_step() {
   }
   const Real rate = flow_ ? front_->crossing_rate() : front_->rate();
   Real dt = rate > 0 ? elements / rate : unlimited;
+  if (flow_) dt = std::min(dt, flow_->largest_step());
   const Real inflow = state_.inflow();
   if (inflow > 0 && filling_->unfilled() > 0) dt = std::min(dt, filling_->unfilled() / inflow);
   return dt;
@@ -182,8 +184,13 @@ std::vector<std::string> FillingProcess::history_columns() const {
     columns.push_back("pressure_" + inlet.name + "_Pa");
     columns.push_back("flow_" + inlet.name + "_m3_s");
   }
+  if (has_gas()) columns.insert(columns.end(), {"trapped_air_m3", "trapped_air_Pa"});
   for (const std::string& name : error_columns()) columns.push_back(name);
   return columns;
+}
+
+bool FillingProcess::has_gas() const {
+  return flow_ && flow_->void_model() != nullptr && flow_->void_model()->has_gas();
 }
 
 /// With [reference] at = every: the absolute errors, as summary.json names them.
@@ -204,6 +211,10 @@ std::vector<HistoryCell> FillingProcess::history_row() {
   for (const GateState& gate : state_.gates) {
     row.push_back(flow_ ? HistoryCell(gate.pressure) : HistoryCell());
     row.push_back(gate.flow);
+  }
+  if (has_gas()) {
+    const std::array<Real, 2> gas = flow_->void_model()->trapped_gas();
+    row.insert(row.end(), {gas[0], gas[1]});
   }
   const std::vector<std::string> errors = error_columns();
   if (errors.empty()) return row;

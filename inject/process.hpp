@@ -66,6 +66,7 @@ class FillingProcess final : public Process {
   nlohmann::json known_errors();
   std::vector<std::string> error_columns() const;
   Real stride() const;
+  bool has_gas() const;
 
   Scene scene_;
   FrontSet fronts_;

@@ -327,6 +327,10 @@ void InjectCase::check(CaseReader& reader) const {
     reader.fail("initial", "fluid", "several fluids: [initial] fluid must name the one that fills the cavity");
   }
   for (const InletSettings& inlet : inlets) {
+    const int fluid = fluid_index(inlet.fluid);
+    if (fluid >= 0 && fluids[static_cast<std::size_t>(fluid)].law == FluidSettings::Law::empty) {
+      reader.fail("inlet." + inlet.name, "fluid", "is void, which does not flow: give it a small viscosity");
+    }
     if (is_mixture && inlet.fluid.empty()) reader.fail("inlet." + inlet.name, "fluid", "must be given: several fluids");
   }
   for (const InitialShape& shape : shapes) {
@@ -340,14 +344,17 @@ void InjectCase::check(CaseReader& reader) const {
   refuse(common.thermal.has_value(), "thermal", "inject models no heat yet; remove the section");
   common.refuse_heat_without_thermal(reader);
   refuse(common.inertia.has_value(), "inertia", "inject models no inertia yet; remove the section");
-  refuse(common.air.has_value(), "air", "inject does not compress trapped air yet; remove the section");
+  refuse(common.air && (!is_mixture || fluids[static_cast<std::size_t>(std::max(0, initial_fluid()))].law !=
+                                           FluidSettings::Law::empty),
+         "air", "is about air that is not modelled as a fluid: [initial] fluid needs law = void");
   if (front.transport == FrontSettings::Transport::trace) {
     reader.fail("front", "transport", "trace is not available yet; use crank-nicolson");
   }
-  for (const FluidSettings& fluid : fluids) {
-    if (fluid.law == FluidSettings::Law::empty) {
-      reader.fail("fluid." + fluid.name, "law", "void is not available yet; give the fluid a small viscosity");
-    }
+  for (std::size_t i = 0; i < fluids.size(); ++i) {
+    if (fluids[i].law != FluidSettings::Law::empty || (is_mixture && static_cast<int>(i) == initial_fluid())) continue;
+    reader.fail("fluid." + fluids[i].name, "law",
+                "void is what fills the cavity at the start, [initial] fluid, and is driven out by others; give this "
+                "fluid a small viscosity");
   }
   if (common.gravity) {
     for (const FluidSettings& fluid : fluids) {

@@ -109,6 +109,22 @@ void StokesOperator::add_tractions(Balance& sums) const {
   }
 }
 
+/// What is not modelled has the stress -p: its forces are those of such an element.
+template <class Element>
+void StokesOperator::add_void_pressure(Balance& sums) const {
+  if (loads_.void_pressure.empty()) return;
+  constexpr int D = Element::dim;
+  for (LocalId e = 0; e < mesh_->elements(); ++e) {
+    const Real pressure = loads_.void_pressure[static_cast<std::size_t>(e)];
+    if (viscosity_[static_cast<std::size_t>(e)] > 0 || pressure == 0) continue;
+    ElementUnknowns<D> uniform;
+    uniform.pressure.setConstant(pressure);
+    ElementUnknowns<D> forces = Element(simplex_points<D>(*mesh_, e)).residual(uniform, 1, 1);
+    forces.pressure.setZero();
+    scatter<D>(*mesh_, e, forces, 1, sums.external);
+  }
+}
+
 void StokesOperator::add_terms(std::span<const Real> unknowns, Balance& sums) const {
   if (terms_.empty()) return;
   const auto dim = static_cast<std::size_t>(mesh_->dim);
@@ -127,8 +143,10 @@ StokesOperator::Balance StokesOperator::balance(const StokesState& state) {
   Balance sums;
   sums.internal.assign(unknowns.size(), 0.0);
   sums.external.assign(unknowns.size(), 0.0);
-  with_element(mesh_->dim, geometry_,
-               [&]<class Element>(std::type_identity<Element>) { add_elements<Element>(unknowns, sums); });
+  with_element(mesh_->dim, geometry_, [&]<class Element>(std::type_identity<Element>) {
+    add_elements<Element>(unknowns, sums);
+    add_void_pressure<Element>(sums);
+  });
   with_dim(mesh_->dim, [&](auto d) { add_tractions<decltype(d)::value>(sums); });
   add_terms(unknowns, sums);
   space_->halo().add_to_owners(sums.internal, size);
@@ -143,6 +161,29 @@ StokesOperator::Balance StokesOperator::balance(const StokesState& state) {
     }
   }
   return sums;
+}
+
+/// Rows of the gates, scaled, and how far their flows are from the demanded ones.
+void StokesOperator::judge_gates(const StokesState& state, LinearVector& result, ResidualReport& report) const {
+  const auto dim = static_cast<std::size_t>(mesh_->dim);
+  result.borders.assign(gates_.size(), 0.0);
+  for (std::size_t g = 0; g < gates_.size(); ++g) {
+    const GateColumn& column = gate_columns_[g];
+    for (std::size_t k = 0; k < column.nodes.size(); ++k) {
+      const Real* v = state.nodes.data() + static_cast<std::size_t>(column.nodes[k]) * (dim + 1);
+      for (std::size_t d = 0; d < dim; ++d) result.borders[g] += column.values[k * dim + d] * v[d];
+    }
+  }
+  comm_->sum_in_place(result.borders);
+  Real largest_flux = 0;
+  for (std::size_t g = 0; g < gates_.size(); ++g) {
+    const Real flux = gates_[g].flux + gates_[g].compliance * (state.borders[g] - gates_[g].reference);
+    result.borders[g] -= flux;
+    report.gate_error = std::max(report.gate_error, std::abs(result.borders[g]));
+    largest_flux = std::max(largest_flux, std::abs(flux));
+    result.borders[g] *= system_.pressure_scale;
+  }
+  report.gate_error = largest_flux > 0 ? report.gate_error / largest_flux : 0;
 }
 
 ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& result) {
@@ -166,24 +207,8 @@ ResidualReport StokesOperator::residual(const StokesState& state, LinearVector& 
     constraints_.project(local, place);
     place[dim] *= constraints_.is_pressure_fixed(local) ? 0 : scale;
   }
-  result.borders.assign(gates_.size(), 0.0);
-  for (std::size_t g = 0; g < gates_.size(); ++g) {
-    const GateColumn& column = gate_columns_[g];
-    for (std::size_t k = 0; k < column.nodes.size(); ++k) {
-      const Real* v = state.nodes.data() + static_cast<std::size_t>(column.nodes[k]) * (dim + 1);
-      for (int d = 0; d < dim; ++d) result.borders[g] += column.values[k * static_cast<std::size_t>(dim) + d] * v[d];
-    }
-  }
-  comm_->sum_in_place(result.borders);
   ResidualReport report;
-  Real largest_flux = 0;
-  for (std::size_t g = 0; g < gates_.size(); ++g) {
-    result.borders[g] -= gates_[g].flux;
-    report.gate_error = std::max(report.gate_error, std::abs(result.borders[g]));
-    largest_flux = std::max(largest_flux, std::abs(gates_[g].flux));
-    result.borders[g] *= scale;
-  }
-  report.gate_error = largest_flux > 0 ? report.gate_error / largest_flux : 0;
+  judge_gates(state, result, report);
   report.net_flow = remove_net_flow(result);
   for (const Real value : result.nodes) squares[0] += value * value;
   comm_->sum_in_place(squares);
@@ -231,12 +256,13 @@ void StokesOperator::add_element_matrices(const StokesState& state, Tangent kind
 void StokesOperator::scale_borders() {
   const auto dim = static_cast<std::size_t>(mesh_->dim);
   system_.borders.clear();
-  for (const GateColumn& column : gate_columns_) {
-    BorderColumn border{column.nodes, column.values, 0};
+  for (std::size_t g = 0; g < gates_.size(); ++g) {
+    const Real scale = system_.pressure_scale;
+    BorderColumn border{gate_columns_[g].nodes, gate_columns_[g].values, -gates_[g].compliance * scale * scale};
     for (std::size_t k = 0; k < border.nodes.size(); ++k) {
       constraints_.project(border.nodes[k], border.values.data() + k * dim);
     }
-    for (Real& value : border.values) value *= system_.pressure_scale;
+    for (Real& value : border.values) value *= scale;
     system_.borders.push_back(std::move(border));
   }
 }

@@ -71,7 +71,8 @@ void StokesOperator::find_pressure_null() {
     constraints_.project(node, place);
     for (int d = 0; d < dim; ++d) free = std::max(free, std::abs(place[d]));
   }
-  pressure_is_free_ = comm_->max(free) <= 1e-8 * comm_->max(largest);
+  const bool any_gas = std::any_of(gates_.begin(), gates_.end(), [](const FluxGate& g) { return g.compliance > 0; });
+  pressure_is_free_ = comm_->max(free) <= 1e-8 * comm_->max(largest) && !any_gas;
   if (!pressure_is_free_) node_volume_.clear();
 }
 
@@ -131,19 +132,19 @@ void StokesOperator::compute_volumes() {
   length_ = std::pow(mean, 1.0 / mesh_->dim);
 }
 
+bool StokesOperator::is_at_rest(LocalId node) const {
+  std::array<Real, 3> velocity = {1, 1, 1};
+  constraints_.impose(node, velocity.data());
+  return constraints_.fixed_directions(node) == mesh_->dim &&
+         std::all_of(velocity.begin(), velocity.begin() + mesh_->dim, [](Real v) { return v == 0; });
+}
+
 void StokesOperator::find_still_elements() {
   still_.clear();
   if (!leaves_out_still_) return;
-  const int dim = mesh_->dim;
-  const auto is_at_rest = [&](LocalId node) {
-    std::array<Real, 3> velocity = {1, 1, 1};
-    constraints_.impose(node, velocity.data());
-    return constraints_.fixed_directions(node) == dim &&
-           std::all_of(velocity.begin(), velocity.begin() + dim, [](Real v) { return v == 0; });
-  };
   for (LocalId e = 0; e < mesh_->elements(); ++e) {
     const auto nodes = mesh_->nodes_of_element(e);
-    if (std::all_of(nodes.begin(), nodes.end(), is_at_rest)) still_.push_back(e);
+    if (std::all_of(nodes.begin(), nodes.end(), [&](LocalId node) { return is_at_rest(node); })) still_.push_back(e);
   }
 }
 
@@ -190,6 +191,23 @@ void StokesOperator::choose_scale() {
   scale_is_chosen_ = true;
 }
 
+/// A pocket pushes on what is around it as elements of the pressure one would.
+void StokesOperator::add_void_column(const FluxGate& gate, std::vector<Real>& dense) const {
+  with_element(mesh_->dim, geometry_, [&]<class Element>(std::type_identity<Element>) {
+    constexpr int D = Element::dim;
+    ElementUnknowns<D> uniform;
+    uniform.pressure.setOnes();
+    for (const LocalId e : gate.voids) {
+      const ElementUnknowns<D> forces = Element(simplex_points<D>(*mesh_, e)).residual(uniform, 1, 1);
+      const auto nodes = mesh_->nodes_of_element(e);
+      for (int a = 0; a <= D; ++a) {
+        Eigen::Map<Point<D>>(dense.data() + static_cast<std::size_t>(nodes[static_cast<std::size_t>(a)]) * D) +=
+            forces.velocity.col(a);
+      }
+    }
+  });
+}
+
 StokesOperator::GateColumn StokesOperator::gate_column(const FluxGate& gate) const {
   const int dim = mesh_->dim;
   std::vector<Real> dense(static_cast<std::size_t>(mesh_->nodes()) * dim, 0.0);
@@ -205,11 +223,12 @@ StokesOperator::GateColumn StokesOperator::gate_column(const FluxGate& gate) con
       }
     }
   });
+  add_void_column(gate, dense);
   mesh_->node_halo.add_to_owners(dense, dim);
   GateColumn column;
   for (LocalId node = 0; node < mesh_->owned_nodes(); ++node) {
     const Real* value = dense.data() + static_cast<std::size_t>(node) * dim;
-    if (std::all_of(value, value + dim, [](Real x) { return x == 0; })) continue;
+    if (is_at_rest(node) || std::all_of(value, value + dim, [](Real x) { return x == 0; })) continue;
     column.nodes.push_back(node);
     column.values.insert(column.values.end(), value, value + dim);
   }
@@ -222,6 +241,7 @@ StokesState StokesOperator::start_state() const {
   impose_constraints(state);
   const auto dim = static_cast<std::size_t>(mesh_->dim);
   for (std::size_t g = 0; g < gates_.size(); ++g) {
+    if (gates_[g].flux == 0) continue;
     std::vector<Real> along = gate_columns_[g].values;
     Real through = 0;
     for (std::size_t k = 0; k < gate_columns_[g].nodes.size(); ++k) {

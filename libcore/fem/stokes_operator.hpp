@@ -31,13 +31,20 @@ struct StokesLoads {
   std::vector<Real> node_force;          ///< [local node][dim], N/m^3, linear between; added to the former
   std::vector<Real> element_divergence;  ///< [element], 1/s: div v demanded (volume targets)
   std::vector<FacetTraction> tractions;
+  /// [element], Pa: of what is in elements that are not modelled; where those meet modelled ones, -p n acts on these.
+  std::vector<Real> void_pressure;
 };
 
-/// Facets that share one unknown pressure q, traction -q n, such that the flow through them is the demanded one:
-/// integral of v.n over all ranks' facets = flux, n outward [m^3/s; negative = into the domain].
+/// Facets, or the border of elements that are not modelled (a closed pocket), that share one unknown pressure q,
+/// traction -q n, such that the flow through them is the demanded one: integral of v.n over all ranks' facets =
+/// flux + compliance (q - reference), n out of what is modelled [m^3/s; negative = into the domain]. A pocket of gas at
+/// p with volume V, asked for the pressure at the end of a step dt, has compliance V/(p dt) and reference p.
 struct FluxGate {
   std::vector<LocalId> facets;
   Real flux = 0;
+  std::vector<LocalId> voids = {};  ///< elements of this rank that are not modelled
+  Real compliance = 0;              ///< m^3/(s Pa), >= 0
+  Real reference = 0;               ///< Pa
 };
 
 /// Sizes against which residuals are judged; reduced over the ranks.
@@ -165,6 +172,8 @@ class StokesOperator {
   void find_pressure_null();
   Real remove_net_flow(LinearVector& residual) const;
   GateColumn gate_column(const FluxGate& gate) const;
+  void add_void_column(const FluxGate& gate, std::vector<Real>& dense) const;
+  bool is_at_rest(LocalId node) const;
   std::vector<Real> unknowns_in_space(const StokesState& state) const;
   Balance balance(const StokesState& state);
   template <class Element>
@@ -173,6 +182,9 @@ class StokesOperator {
   ElementLoad<Element::dim> element_load(LocalId element) const;
   template <int D>
   void add_tractions(Balance& sums) const;
+  template <class Element>
+  void add_void_pressure(Balance& sums) const;
+  void judge_gates(const StokesState& state, LinearVector& result, ResidualReport& report) const;
   void add_terms(std::span<const Real> unknowns, Balance& sums) const;
   template <class Element>
   void add_element_matrices(const StokesState& state, Tangent kind);
