@@ -38,6 +38,8 @@ Flow::Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state
   scene_.fields.declare(scene_.mesh, {"pressure", "Pa", Support::node, 1, Transfer::interpolate, false});
   scene_.fields.declare(scene_.mesh, {"viscosity", "Pa.s", Support::element, 1, Transfer::interpolate, true});
   scene_.fields.declare(scene_.mesh, {"strain_rate", "1/s", Support::element, 1, Transfer::interpolate, true});
+  scene_.fields.declare(scene_.mesh, {"shear_rate", "1/s", Support::element, 1, Transfer::recompute, true});
+  scene_.fields.declare(scene_.mesh, {"wall_shear_stress", "Pa", Support::node, 1, Transfer::recompute, true});
   if (mixture.has_void()) void_.emplace(scene, fronts, mixture);
   rebuild();
 }

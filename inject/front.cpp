@@ -54,6 +54,7 @@ Real facet_outflow(const Scene& scene, LocalId facet, std::span<const Real> velo
 Front::Front(Scene& scene, FrontSet& fronts, FillingState& state, std::function<void(Real)> renew_velocity)
     : scene_(scene), fronts_(fronts), state_(state), renew_velocity_(std::move(renew_velocity)) {
   scene_.fields.declare(scene_.mesh, {"fill_time", "s", Support::node, 1, Transfer::interpolate, false});
+  scene_.fields.declare(scene_.mesh, {"weld_angle", "deg", Support::node, 1, Transfer::recompute, true});
   rebuild();
 }
 

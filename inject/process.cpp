@@ -8,8 +8,11 @@
 
 #include "base/log.hpp"
 #include "fem/error_norms.hpp"
+#include "inject/error_sources.hpp"
 #include "inject/forecast.hpp"
 #include "inject/front_sizes.hpp"
+#include "inject/wall_loads.hpp"
+#include "inject/weld_lines.hpp"
 
 namespace malleus::inject {
 namespace {
@@ -140,10 +143,39 @@ Forecast FillingProcess::forecast() const {
 
 std::vector<std::string> FillingProcess::output_fields() const {
   std::vector<std::string> names = {"velocity", "pressure", "viscosity", "strain_rate"};
+  if (flow_) names.insert(names.end(), {"shear_rate", "wall_shear_stress"});
   for (const std::string& name : fronts_.names()) names.push_back(name);
   names.emplace_back("fill_time");
+  if (front_) names.emplace_back("weld_angle");
   if (has_gas()) names.emplace_back("air_pressure");
   return names;
+}
+
+void FillingProcess::refresh_outputs() {
+  if (flow_) {
+    const std::span<const Real> strain_rate = scene_.fields["strain_rate"].values();
+    const std::span<Real> shear_rate = scene_.fields["shear_rate"].values();
+    for (std::size_t e = 0; e < shear_rate.size(); ++e) shear_rate[e] = std::sqrt(3.0) * strain_rate[e];
+    scene_.fields["wall_shear_stress"].assign(wall_shear_stress(scene_));
+  }
+  if (front_) scene_.fields["weld_angle"].assign(weld_angle(scene_, scene_.fields["fill_time"].values()));
+}
+
+ErrorBudget FillingProcess::error_budget() {
+  const InjectCase& settings = scene_.settings;
+  ErrorClues clues;
+  clues.has_front = has_fronts() && filling_ != nullptr;
+  clues.solves_flow = flow_ != nullptr;
+  clues.is_linear = mixture_->is_linear();
+  clues.follows_distance = settings.flow.update.kind == FlowUpdate::Kind::automatic;
+  clues.freezing_elements = flow_ ? flow_->freezing_error() : 0;
+  clues.way_elements = way_ / scene_.element_size;
+  clues.cfl = settings.front.cfl;
+  clues.volume_error = filling_ ? filling_->volume_error() : 0;
+  clues.newton_tolerance = settings.common.solver.newton_tolerance;
+  clues.linear_tolerance = settings.common.solver.linear_tolerance;
+  clues.thin = thin_;
+  return error_sources(clues);
 }
 
 /// Elements that the front crosses in an increment: as many as the flow may lag behind.
@@ -184,6 +216,9 @@ std::vector<std::string> FillingProcess::history_columns() const {
     columns.push_back("pressure_" + inlet.name + "_Pa");
     columns.push_back("flow_" + inlet.name + "_m3_s");
   }
+  if (flow_) {
+    for (int c = 0; c < scene_.mesh.dim; ++c) columns.push_back(fmt::format("clamp_force_{}_N", "xyz"[c]));
+  }
   if (has_gas()) columns.insert(columns.end(), {"trapped_air_m3", "trapped_air_Pa"});
   for (const std::string& name : error_columns()) columns.push_back(name);
   return columns;
@@ -211,6 +246,10 @@ std::vector<HistoryCell> FillingProcess::history_row() {
   for (const GateState& gate : state_.gates) {
     row.push_back(flow_ ? HistoryCell(gate.pressure) : HistoryCell());
     row.push_back(gate.flow);
+  }
+  if (flow_) {
+    const std::array<Real, 3> force = opening_force(scene_);
+    row.insert(row.end(), force.begin(), force.begin() + scene_.mesh.dim);
   }
   if (has_gas()) {
     const std::array<Real, 2> gas = flow_->void_model()->trapped_gas();

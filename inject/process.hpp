@@ -38,6 +38,8 @@ class FillingProcess final : public Process {
   std::vector<std::string> accuracy_settings() const override;
   Forecast forecast() const override;
   std::vector<std::string> output_fields() const override;
+  void refresh_outputs() override;
+  ErrorBudget error_budget() override;
   Real largest_step() override;
   std::optional<std::string> finished() override;
   std::vector<Real> results() override;

@@ -1,6 +1,8 @@
 #include "inject/trapped_gas.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace malleus::inject {
 namespace {
@@ -10,7 +12,7 @@ constexpr std::size_t most_pairs = 1'000'000;  ///< of old and new regions that 
 }  // namespace
 
 TrappedGas::TrappedGas(Scene& scene, Real absolute) : scene_(scene), absolute_(absolute) {
-  scene_.fields.declare(scene_.mesh, {"air_pocket", "", Support::node, 1, Transfer::interpolate, false});
+  scene_.fields.declare(scene_.mesh, {"air_pocket", "1", Support::node, 1, Transfer::interpolate, false});
   scene_.fields.declare(scene_.mesh, {"air_pressure", "Pa", Support::node, 1, Transfer::interpolate, false});
 }
 
@@ -94,7 +96,10 @@ void TrappedGas::load(const nlohmann::json& saved) {
   contents_ = saved.at("contents").get<std::vector<Real>>();
   volumes_ = saved.at("volumes").get<std::vector<Real>>();
   vented_ = saved.at("vented").get<std::vector<char>>();
-  knows_places_ = true;
+  // Interpolated on another mesh, numbers of regions mean nothing.
+  const std::span<const Real> pocket = std::as_const(scene_.fields)["air_pocket"].values();
+  knows_places_ = scene_.comm.all(
+      std::all_of(pocket.begin(), pocket.end(), [](Real number) { return number == std::round(number); }));
 }
 
 }  // namespace malleus::inject

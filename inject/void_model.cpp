@@ -136,7 +136,8 @@ void VoidModel::fill(std::span<const Real> element_viscosity, Real inflow, Stoke
 Real VoidModel::largest_step() const {
   constexpr Real largest_change = 0.1;
   Real step = std::numeric_limits<Real>::infinity();
-  for (std::size_t k = 0; gas_ && k < voids_.regions.size(); ++k) {
+  if (!gas_ || inflows_.size() != voids_.regions.size()) return step;  // not solved yet
+  for (std::size_t k = 0; k < voids_.regions.size(); ++k) {
     if (!is_closed(k) || inflows_[k] == 0) continue;
     step = std::min(step, largest_change * voids_.regions[k].volume / std::abs(inflows_[k]));
   }
@@ -148,37 +149,31 @@ std::array<Real, 2> VoidModel::trapped_gas() const {
   for (std::size_t k = 0; k < voids_.regions.size(); ++k) {
     if (!is_closed(k)) continue;
     result[0] += voids_.regions[k].volume;
-    result[1] = std::max(result[1], pressures_[k]);
+    if (k < pressures_.size()) result[1] = std::max(result[1], pressures_[k]);
   }
   return result;
 }
 
 nlohmann::json VoidModel::save() const {
   nlohmann::json regions = nlohmann::json::array();
-  for (std::size_t k = 0; k < voids_.regions.size(); ++k) {
-    const VoidRegion& region = voids_.regions[k];
-    regions.push_back({{"volume", region.volume},
-                       {"is_vented", region.is_vented},
-                       {"pressure", pressures_[k]},
-                       {"inflow", inflows_[k]}});
+  for (const VoidRegion& region : voids_.regions) {
+    regions.push_back({{"volume", region.volume}, {"is_vented", region.is_vented}, {"pressure", region.pressure}});
   }
-  nlohmann::json saved = {{"regions", regions}};
+  nlohmann::json saved = {{"regions", regions}, {"pressures", pressures_}, {"inflows", inflows_}};
   if (gas_) saved["gas"] = gas_->save();
   return saved;
 }
 
 void VoidModel::load(const nlohmann::json& saved) {
   voids_ = {};
-  pressures_.clear();
-  inflows_.clear();
   for (const nlohmann::json& region : saved.at("regions")) {
     VoidRegion& known = voids_.regions.emplace_back();
     known.volume = region.at("volume");
     known.is_vented = region.at("is_vented");
     known.pressure = region.at("pressure");
-    pressures_.push_back(region.at("pressure"));
-    inflows_.push_back(region.at("inflow"));
   }
+  pressures_ = saved.at("pressures").get<std::vector<Real>>();
+  inflows_ = saved.at("inflows").get<std::vector<Real>>();
   if (gas_) gas_->load(saved.at("gas"));
 }
 
