@@ -1,9 +1,12 @@
 """Forging: what a run tells of itself beside forces: work, contact areas, die filling, folds, error budget."""
+import os
+import pathlib
+import subprocess
 import unittest
 
 from box_msh import BoxMesh
 from forging import Forging, K, box_mesh, case_text, flow_stress
-from runs import summary
+from runs import history, run, summary
 
 
 class Work(Forging):
@@ -74,6 +77,19 @@ class Surface(Forging):
                     self.assertAlmostEqual(fold["place_m"][0], 0, delta=0.02)
                     self.assertGreater(fold["time_s"], 0.05)
                     self.assertIn("begins to fold at", (self.directory / "out" / "run.log").read_text())
+
+
+class PaperForging(Forging):
+    def test_it_is_remeshed_each_increment_and_balances(self):
+        case = pathlib.Path(os.environ["MALLEUS_SOURCE"]) / "cases" / "paper-forging"
+        mesh = self.directory / "paper.msh"
+        subprocess.run([case / "mesh", "--size", "6", "--die-size", "12", "-o", mesh], check=True, capture_output=True)
+        run("forge", case / "case.ini", self.directory / "out", "-D", f"mesh.file={mesh}", "-D", "time.increments=3")
+        rows = history(self.directory / "out")
+        self.assertEqual([row["remeshed"] for row in rows][1:], [1, 1])
+        for row in rows:
+            self.assertAlmostEqual(row["force_upper_z_N"] / row["force_lower_z_N"], -1, delta=1e-4)
+            self.assertLess(abs(row["volume_change"]), 1e-4)
 
 
 class Budget(Forging):
