@@ -25,6 +25,9 @@ std::vector<std::string> plan_lines(Process& process, const RunSettings& setting
   }
   lines.push_back("left out:");
   for (const LeftOut& left : process.left_out()) lines.push_back(fmt::format("  {} ({})", left.physics, left.reason));
+  const std::vector<std::string> suggestions = process.suggestions();
+  if (!suggestions.empty()) lines.emplace_back("could be left out (docs/simplifications.md):");
+  for (const std::string& suggestion : suggestions) lines.push_back("  " + suggestion);
   lines.push_back(fmt::format("accuracy (level {}):", settings.level));
   for (const std::string& setting : process.accuracy_settings()) lines.push_back("  " + setting);
   const Forecast forecast = process.forecast();
