@@ -32,7 +32,7 @@ class Upsetting(Forging):
                 row = self.forge(text, ranks=ranks)[-1]
                 rise = row["temperature_billet_K"] - 1300
                 self.assertAlmostEqual(rise / (work / DENSITY / CAPACITY), 1, delta=2e-3)
-                self.assertAlmostEqual(row["max_temperature_K"] - row["min_temperature_K"], 0, delta=1e-4 * rise)
+                self.assertAlmostEqual(row["max_temperature_K"] - row["min_temperature_K"], 0, delta=5e-4 * rise)  # newton_tolerance 1e-4
                 heat = summary(self.directory / "out")["accuracy"]["heat"]
                 self.assertAlmostEqual(heat["stored_J"] / heat["dissipated_J"], 1, delta=1e-7)
                 half = text.replace("[thermal]", "[thermal]\ndissipation = 0.5")
