@@ -1,9 +1,14 @@
 #include "storage/h5_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <hdf5.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <functional>
 #include <numeric>
 
@@ -51,6 +56,59 @@ std::vector<hsize_t> chunk_of(std::vector<hsize_t> shape, std::size_t value_byte
   return shape;
 }
 
+/// Bytes by which the image of a file grows.
+constexpr std::size_t image_growth = std::size_t{1} << 20;
+
+void* keep_place(void* image) {
+  return image;
+}
+herr_t forget_place(void* /*image*/) {
+  return 0;
+}
+
+/// HDF5 frees the memory of a file: at its end, when all is in place, its first bytes go to the image, as many as that
+/// holds.
+herr_t free_memory(void* memory, H5FD_file_image_op_t operation, void* image) {
+  auto& kept = *static_cast<std::vector<char>*>(image);
+  if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE && !kept.empty()) std::memcpy(kept.data(), memory, kept.size());
+  std::free(memory);
+  return 0;
+}
+void* make_memory(std::size_t bytes, H5FD_file_image_op_t /*operation*/, void* /*image*/) {
+  return std::malloc(bytes);
+}
+void* copy_memory(void* to, const void* from, std::size_t bytes, H5FD_file_image_op_t /*operation*/, void* /*image*/) {
+  return std::memcpy(to, from, bytes);
+}
+void* grow_memory(void* memory, std::size_t bytes, H5FD_file_image_op_t /*operation*/, void* /*image*/) {
+  return std::realloc(memory, bytes);
+}
+
+/// The file is made in memory, and leaves its bytes in the image when it is closed.
+void keep_image(hid_t access, std::vector<char>& image) {
+  H5Pset_fapl_core(access, image_growth, false);
+  H5FD_file_image_callbacks_t callbacks = {make_memory, copy_memory,  grow_memory, free_memory,
+                                           keep_place,  forget_place, &image};
+  H5Pset_file_image_callbacks(access, &callbacks);
+}
+
+/// The number of the system's error; 0 = written.
+int write_bytes(const std::filesystem::path& path, std::span<const char> bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+  if (file < 0) return errno;
+  int error = 0;
+  while (!bytes.empty() && error == 0) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written >= 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    } else if (errno != EINTR) {
+      error = errno;
+    }
+  }
+  if (::close(file) != 0 && error == 0) error = errno;
+  return error;
+}
+
 template <class T>
 hid_t memory_type();
 template <>
@@ -72,14 +130,16 @@ hid_t memory_type<std::int64_t>() {
 
 }  // namespace
 
-H5File::H5File(const std::filesystem::path& path, Mode mode) : path_(path) {
+H5File::H5File(const std::filesystem::path& path, Mode mode) : path_(path), is_written_(mode != Mode::read) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are told by our own errors
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  const TimelessProperties timeless(H5P_FILE_CREATE);
   is_checked_ = mode == Mode::create_checked;
   if (is_checked_) H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
-  file_ = mode == Mode::read ? H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get())
-                             : H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get());
-  if (file_ < 0) fail(mode == Mode::read ? "cannot be opened as an HDF5 file" : "cannot be created");
+  if (is_written_) keep_image(access.get(), image_);
+  file_ = is_written_ ? H5Fcreate(path.c_str(), H5F_ACC_TRUNC, timeless.get(), access.get())
+                      : H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get());
+  if (file_ < 0) fail(is_written_ ? "cannot be created" : "cannot be opened as an HDF5 file");
 }
 
 H5File::~H5File() {
@@ -87,10 +147,17 @@ H5File::~H5File() {
 }
 
 void H5File::close() {
-  const bool is_flushed = H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0;
-  const bool is_closed = H5Fclose(file_) >= 0;
+  bool is_whole = H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0;
+  if (is_whole && is_written_) {
+    const ssize_t bytes = H5Fget_file_image(file_, nullptr, 0);
+    is_whole = bytes > 0;
+    image_.resize(static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
+  }
+  is_whole = H5Fclose(file_) >= 0 && is_whole;
   file_ = -1;
-  if (!is_flushed || !is_closed) fail("cannot be written to the end (is the disk full?)");
+  if (!is_whole) fail("cannot be put together in memory");
+  if (!is_written_) return;
+  if (const int error = write_bytes(path_, image_)) fail(fmt::format("cannot be written: {}", std::strerror(error)));
 }
 
 void H5File::fail(const std::string& what) const {

@@ -13,7 +13,8 @@
 namespace malleus {
 
 /// A file open for writing or reading by this process alone (no MPI-IO). Paths inside the file are absolute
-/// ("/p0003/points"). Every failure is a StorageError that names the file. Local.
+/// ("/p0003/points"). Every failure is a StorageError that names the file. A file to be written is made in memory and
+/// goes to the disk in close(): HDF5 1.10 does not survive a write that fails. Local.
 class H5File {
  public:
   enum class Mode {
@@ -56,6 +57,8 @@ class H5File {
 
   std::filesystem::path path_;
   std::int64_t file_ = -1;
+  bool is_written_ = false;
+  std::vector<char> image_;  ///< of a file that was written, once it is closed
   bool is_checked_ = false;
 };
 

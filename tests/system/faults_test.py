@@ -214,6 +214,31 @@ class Stops(LongRuns):
         check_sound(self.directory / "out", "forge")
 
 
+class Disks(LongRuns):
+    """Where nothing more can be written a run ends with exit 4, and what stood there stays."""
+
+    def test_a_full_disk(self):
+        for program in PROGRAMS:
+            case = write_case(program, self.directory, self.INCREMENTS)
+            for kilobytes, ranks in ((40, 1), (100, 1), (160, 2), (300, 2)):
+                with self.subTest(program=program, kilobytes=kilobytes, ranks=ranks):
+                    place = self.directory / f"disk-{program}-{kilobytes}"
+                    place.mkdir()
+                    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", place]
+                    if subprocess.run(mount, capture_output=True).returncode != 0:
+                        self.skipTest("no file system can be mounted here")
+                    self.addCleanup(subprocess.run, ["umount", place], check=True)
+                    code, said = finish(start(program, case, place / "out", ranks=ranks))
+                    self.assertEqual(code, 4, said)
+                    self.assertIn("No space left on device", said)
+
+    def test_a_place_where_nothing_can_be_made(self):
+        case = write_case("forge", self.directory, self.INCREMENTS)
+        (self.directory / "file").write_text("")
+        code, said = finish(start("forge", case, self.directory / "file" / "out"))
+        self.assertEqual(code, 4, said)
+
+
 class Odd(LongRuns):
     def test_a_rank_that_stands_still_for_a_while(self):
         case = write_case("forge", self.directory, self.INCREMENTS)
