@@ -22,8 +22,10 @@ ErrorBudget error_sources(const ErrorClues& clues) {
     budget.add({"volume", std::abs(clues.volume_error), "filled less initial less injected", "[front] cfl", 0.5, 1.4});
   }
   if (clues.has_front && clues.solves_flow) {
-    const Real lost = clues.freezing_elements / std::max(1.0, clues.way_elements);
-    budget.add({"frozen flow", lost, "change of the front's velocity at each solve, over its way",
+    // The resistance goes with what is filled: pressures lag by what came in since the flow was last solved.
+    const Real lost = clues.freezing_elements / std::max(1.0, clues.way_elements) + clues.filled_since_flow;
+    budget.add({"frozen flow", lost,
+                "change of the front's velocity at each solve, over its way; filled since the last",
                 clues.follows_distance ? "[flow] update_distance" : "[flow] update", 0.5, 1.9});
   }
   if (!clues.solves_flow) return budget;

@@ -14,6 +14,7 @@ struct ErrorClues {
   bool is_linear = true;         ///< all fluids are Newtonian
   bool follows_distance = true;  ///< [flow] update = auto
   Real freezing_elements = 0;    ///< by which keeping the flow misplaced the front, summed
+  Real filled_since_flow = 0;    ///< share of the filled volume that came in since the last solve
   Real way_elements = 1;         ///< that the front had before it at the start
   Real cfl = 0;
   Real volume_error = 0;  ///< relative to the cavity

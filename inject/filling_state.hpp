@@ -25,6 +25,7 @@ struct FillingState {
   Real initial = 0;              ///< filled at the start
   Real injected = 0;             ///< through the inlets since
   Real left = 0;                 ///< of the filled, through vents and boundaries
+  Real filled_at_flow = 0;       ///< filled when the flow was last solved
   Real filled = 0;
   Real travelled = 0;         ///< elements that the front moved since the flow was solved
   bool flow_updated = false;  ///< in this increment

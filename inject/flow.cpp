@@ -196,6 +196,7 @@ Outcome Flow::solve(Real time, Real dt) {
   if (outcome.kind != Outcome::Kind::done) return outcome;
   if (was_solved) note_freezing(old_velocity);
   is_asked_ = false;
+  state_.filled_at_flow = state_.filled;
   state_.travelled = 0;
   state_.seconds_since_flow = 0;
   state_.increments_since_flow = 0;

@@ -20,6 +20,8 @@ namespace {
 constexpr Real unlimited = std::numeric_limits<Real>::infinity();
 /// Elements that the front may cross in an increment where the flow stays as it is: what an output shows.
 constexpr Real frozen_stride = 4;
+/// Below this share of what the pressures could do a fluid is at rest.
+constexpr Real share_of_rest = 1e-4;
 /// Away from power-law scenes the shear-rate cut-off plays no part.
 Real cut_off(const Scene& scene) {
   return scene.settings.common.solver.cutoff_strain_rate * typical_shear_rate(scene);
@@ -169,6 +171,7 @@ ErrorBudget FillingProcess::error_budget() {
   clues.is_linear = mixture_->is_linear();
   clues.follows_distance = settings.flow.update.kind == FlowUpdate::Kind::automatic;
   clues.freezing_elements = flow_ ? flow_->freezing_error() : 0;
+  clues.filled_since_flow = state_.filled > 0 ? std::abs(state_.filled - state_.filled_at_flow) / state_.filled : 0;
   clues.way_elements = way_ / scene_.element_size;
   clues.cfl = settings.front.cfl;
   clues.volume_error = filling_ ? filling_->volume_error() : 0;
@@ -279,7 +282,24 @@ std::vector<Real> FillingProcess::results() {
   const auto viscosity = scene_.fields["viscosity"].values();
   Real power = 0;
   for (std::size_t e = 0; e < rate.size(); ++e) power += 3 * viscosity[e] * rate[e] * rate[e] * scene_.measures[e];
-  return {scene_.comm.sum(power)};
+  power = scene_.comm.sum(power);
+  return power > share_of_rest * power_of_pressures() ? std::vector<Real>{power} : std::vector<Real>{};
+}
+
+/// Power [W] that the pressures' differences would have on the fastest flow through the cavity: what stirs in a fluid
+/// at rest, by the tolerance of the solver, is nothing beside it.
+Real FillingProcess::power_of_pressures() const {
+  Real low = unlimited;
+  Real high = -unlimited;
+  for (const Real value : scene_.fields["pressure"].values()) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  Real speed = 0;
+  for (const Real value : scene_.fields["velocity"].values()) speed = std::max(speed, std::abs(value));
+  const Real difference = scene_.comm.max(high) + scene_.comm.max(-low);
+  const Real section = std::pow(scene_.cavity, 1 - 1.0 / scene_.mesh.dim);
+  return difference * scene_.comm.max(speed) * section;
 }
 
 void FillingProcess::solve_all_next() {
@@ -360,8 +380,10 @@ std::vector<std::string> FillingProcess::closing_lines() {
   if (trapped.size() > most_lines)
     lines.push_back(fmt::format("and {} smaller air traps", trapped.size() - most_lines));
   if (flow_) {
-    lines.push_back(fmt::format("keeping the flow between solves moved the front by {:.2g} elements in all",
-                                flow_->freezing_error()));
+    lines.push_back(state_.flow_solves > 1
+                        ? fmt::format("keeping the flow between solves moved the front by {:.2g} elements in all",
+                                      flow_->freezing_error())
+                        : "the flow was solved once: how far keeping it moved the front is not known");
   }
   return lines;
 }
@@ -381,6 +403,7 @@ nlohmann::json FillingProcess::save_state() const {
                           {"injected", state_.injected},
                           {"left", state_.left},
                           {"filled", state_.filled},
+                          {"filled_at_flow", state_.filled_at_flow},
                           {"travelled", state_.travelled},
                           {"seals", fronts_.seals()},
                           {"flow_solves", state_.flow_solves},
@@ -411,6 +434,7 @@ void FillingProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::
   state_.injected = state.at("injected");
   state_.left = state.at("left");
   state_.filled = state.at("filled");
+  state_.filled_at_flow = state.at("filled_at_flow");
   state_.travelled = state.at("travelled");
   fronts_.set_seals(state.at("seals").get<std::vector<char>>());
   state_.flow_solves = state.at("flow_solves");

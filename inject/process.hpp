@@ -64,6 +64,7 @@ class FillingProcess final : public Process {
   Probes* probes() override { return probes_ ? probes_.get() : nullptr; }
 
  private:
+  Real power_of_pressures() const;
   void rebuild();
   nlohmann::json known_errors();
   std::vector<std::string> error_columns() const;
