@@ -57,7 +57,10 @@ StopRequest::StopRequest() {
 
 StopRequest::~StopRequest() {
   received_signal = 0;
-  for (const int number : stop_signals) std::signal(number, SIG_DFL);
+  // A wish to stop that comes again once all is written must not end the program by itself.
+  for (const int number : stop_signals) {
+    std::signal(number, number == SIGUSR1 || number == SIGUSR2 ? SIG_IGN : SIG_DFL);
+  }
 }
 
 std::string StopRequest::asked(const Communicator& comm, const std::filesystem::path& directory) const {

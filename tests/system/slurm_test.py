@@ -43,7 +43,7 @@ class Jobs(unittest.TestCase):
         return "".join(path.read_text() for path in sorted(pathlib.Path(self.scratch).glob("slurm-*.out")))
 
     def test_limit_checkpoint_requeue_done(self):
-        case = write_case("forge", self.scratch, 60)
+        case = write_case("forge", self.scratch, 1000)  # some 10 s: longer than the signal takes
         whole = pathlib.Path(self.scratch) / "whole"
         code, said = finish(start("forge", case, whole, ranks=2))
         self.assertEqual(code, 0, said)
