@@ -43,15 +43,15 @@ class Jobs(unittest.TestCase):
         return "".join(path.read_text() for path in sorted(pathlib.Path(self.scratch).glob("slurm-*.out")))
 
     def test_limit_checkpoint_requeue_done(self):
-        case = write_case("forge", self.scratch, 1000)  # some 10 s: longer than the signal takes
+        case = write_case("forge", self.scratch, 5000)  # some 50 s: the scheduler looks at limits every 30 s
         whole = pathlib.Path(self.scratch) / "whole"
-        code, said = finish(start("forge", case, whole, ranks=2))
+        code, said = finish(start("forge", case, whole, ranks=2), 400)
         self.assertEqual(code, 0, said)
         # The signal is due when the job begins: it comes with the scheduler's next look, within seconds.
         slow = "-D", "output.every=1"
         job = self.submit("--ntasks=2", "--time=1", "--signal=B:USR1@55", SCRIPTS / "job.sh", "forge", case, "-o", "out",
                           *slow)
-        self.assertEqual(self.slurm.wait_to_end(job, 240), "COMPLETED", self.logs())
+        self.assertEqual(self.slurm.wait_to_end(job, 400), "COMPLETED", self.logs())
         output = pathlib.Path(self.scratch) / "out"
         self.assertIn("leg 1 stopped before the time limit; back to the queue", self.logs())
         self.assertEqual(json.loads((output / "summary.json").read_text())["status"], "done")
