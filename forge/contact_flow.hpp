@@ -9,8 +9,9 @@
 
 namespace malleus::forge {
 
-/// Powers at an increment's solve, W: imposed + tools + loads = deformation + contact.
-struct PowerReport {
+/// Who does work on the bodies and where it goes: imposed + tools + loads = deformation + contact. Powers at an
+/// increment's solve [W], or their sums over a run [J].
+struct WorkBalance {
   Real imposed = 0;      ///< by velocities on boundaries
   Real tools = 0;        ///< by tools, on the bodies
   Real deformation = 0;  ///< of the viscous stress
@@ -25,7 +26,7 @@ struct FlowReport {
   std::vector<Vector> body_forces;      ///< [region] N, on it as a master
   std::vector<Vector> boundary_forces;  ///< [boundary] N, on what imposes it
   std::vector<Real> contact_areas;      ///< [tool, then pair] m^2 under pressure
-  PowerReport power;
+  WorkBalance power;
   Real force_imbalance = 0;  ///< sum of the forces that are left over, relative to the largest one
   Real max_penetration = 0;  ///< m, at the end of the increment as the conditions see it
   int contacts = 0;          ///< active contact points

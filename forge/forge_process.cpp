@@ -49,14 +49,14 @@ HeatTotals heat_totals(const nlohmann::json& json) {
   return {json.at("stored_J"), json.at("dissipated_J"), json.at("friction_J"), json.at("imposed_J"), json.at("lost_J")};
 }
 
-nlohmann::json work_json(const PowerReport& work) {
+nlohmann::json work_json(const WorkBalance& work) {
   return {{"imposed_J", work.imposed},
           {"tools_J", work.tools},
           {"deformation_J", work.deformation},
           {"contact_J", work.contact}};
 }
 
-PowerReport work_of(const nlohmann::json& json) {
+WorkBalance work_of(const nlohmann::json& json) {
   return {json.at("imposed_J"), json.at("tools_J"), json.at("deformation_J"), json.at("contact_J")};
 }
 
@@ -442,7 +442,7 @@ Real ForgeProcess::mean_strain_rate() const {
 void ForgeProcess::sum_up_increment() {
   const Real dt = scene_->progress.time - last_time_;
   last_time_ = scene_->progress.time;
-  const PowerReport& power = flow_.report().power;
+  const WorkBalance& power = flow_.report().power;
   work_.imposed += dt * power.imposed;
   work_.tools += dt * power.tools;
   work_.deformation += dt * power.deformation;

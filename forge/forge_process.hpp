@@ -92,7 +92,7 @@ class ForgeProcess final : public Process {
   Real max_imbalance_ = 0;
   Real largest_strain_step_ = 0;  ///< mean over the bodies
   Real last_time_ = 0;            ///< s, of the last row
-  PowerReport work_;              ///< J, of the run
+  WorkBalance work_;              ///< J, of the run
   GlobalId newton_total_ = 0;
   GlobalId increments_ = 0;
 };

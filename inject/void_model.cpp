@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "fem/pressure_extension.hpp"
 #include "solvers/level_set_extension.hpp"
 
 namespace malleus::inject {
@@ -22,20 +23,6 @@ std::vector<std::pair<LocalId, int>> elements_at_gates(const Scene& scene) {
     }
   }
   return found;
-}
-
-/// [node] whether some element of a viscosity touches it. Collective.
-std::vector<char> modelled_nodes(const Mesh& mesh, std::span<const Real> element_viscosity) {
-  std::vector<Real> touches(static_cast<std::size_t>(mesh.nodes()), 0);
-  for (LocalId e = 0; e < mesh.elements(); ++e) {
-    if (!(element_viscosity[static_cast<std::size_t>(e)] > 0)) continue;
-    for (const LocalId node : mesh.nodes_of_element(e)) touches[static_cast<std::size_t>(node)] = 1;
-  }
-  mesh.node_halo.max_to_owners(touches, 1);
-  mesh.node_halo.update_copies(touches, 1);
-  std::vector<char> result(touches.size());
-  std::transform(touches.begin(), touches.end(), result.begin(), [](Real t) { return t > 0 ? 1 : 0; });
-  return result;
 }
 
 }  // namespace

@@ -117,7 +117,7 @@ void Engine::print_outlook() {
   const auto outlook = space_estimate_.look_ahead(process_, settings_.step, is_steady);
   if (!outlook) return;
   const Real increments = static_cast<Real>(std::max<GlobalId>(process_.forecast().increments, 1));
-  log::info("tried on coarser meshes: {:.2g} s an increment, {} in all{}", outlook->increment_s,
+  log::info("by a trial on coarser meshes: {:.2g} s an increment, {} in all{}", outlook->increment_s,
             report::duration(outlook->increment_s * increments),
             outlook->error > 0 ? fmt::format("; error of space about {:.2g} %", 100 * outlook->error) : "");
 }

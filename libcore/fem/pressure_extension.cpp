@@ -1,22 +1,12 @@
 #include "fem/pressure_extension.hpp"
 
+#include <algorithm>
 #include <vector>
 
 namespace malleus {
 namespace {
 
 constexpr int most_layers = 64;
-
-std::vector<Real> modelled_nodes(const Mesh& mesh, std::span<const Real> element_viscosity) {
-  std::vector<Real> is_known(static_cast<std::size_t>(mesh.nodes()), 0.0);
-  for (LocalId e = 0; e < mesh.elements(); ++e) {
-    if (!(element_viscosity[static_cast<std::size_t>(e)] > 0)) continue;
-    for (const LocalId node : mesh.nodes_of_element(e)) is_known[static_cast<std::size_t>(node)] = 1;
-  }
-  mesh.node_halo.max_to_owners(is_known, 1);
-  mesh.node_halo.update_copies(is_known, 1);
-  return is_known;
-}
 
 /// f . (x_to - x_from), Pa.
 Real head(const Mesh& mesh, std::span<const Real> element_force, LocalId element, LocalId from, LocalId to) {
@@ -28,7 +18,7 @@ Real head(const Mesh& mesh, std::span<const Real> element_force, LocalId element
 }
 
 /// Sums of the pressures that known neighbours tell, and their number, [node][2].
-std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const Real> is_known,
+std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const char> is_known,
                                      std::span<const Real> element_force, std::span<const Real> pressure) {
   std::vector<Real> sums(is_known.size() * 2, 0.0);
   for (LocalId e = 0; e < mesh.elements(); ++e) {
@@ -49,16 +39,29 @@ std::vector<Real> sums_of_neighbours(const Mesh& mesh, std::span<const Real> is_
 
 }  // namespace
 
+std::vector<char> modelled_nodes(const Mesh& mesh, std::span<const Real> element_viscosity) {
+  std::vector<Real> touches(static_cast<std::size_t>(mesh.nodes()), 0.0);
+  for (LocalId e = 0; e < mesh.elements(); ++e) {
+    if (!(element_viscosity[static_cast<std::size_t>(e)] > 0)) continue;
+    for (const LocalId node : mesh.nodes_of_element(e)) touches[static_cast<std::size_t>(node)] = 1;
+  }
+  mesh.node_halo.max_to_owners(touches, 1);
+  mesh.node_halo.update_copies(touches, 1);
+  std::vector<char> result(touches.size());
+  std::transform(touches.begin(), touches.end(), result.begin(), [](Real t) { return t > 0 ? 1 : 0; });
+  return result;
+}
+
 void extend_pressure(const Communicator& comm, const Mesh& mesh, std::span<const Real> element_viscosity,
                      std::span<const Real> element_force, std::span<Real> pressure) {
-  std::vector<Real> is_known = modelled_nodes(mesh, element_viscosity);
+  std::vector<char> is_known = modelled_nodes(mesh, element_viscosity);
   for (int layer = 0; layer < most_layers; ++layer) {
     bool any_unknown = false;
-    for (const Real known : is_known) any_unknown = any_unknown || known == 0;
+    for (const char known : is_known) any_unknown = any_unknown || known == 0;
     if (!comm.any(any_unknown)) return;
     const std::vector<Real> sums = sums_of_neighbours(mesh, is_known, element_force, pressure);
     for (std::size_t node = 0; node < is_known.size(); ++node) {
-      if (is_known[node] > 0 || sums[2 * node + 1] == 0) continue;
+      if (is_known[node] != 0 || sums[2 * node + 1] == 0) continue;
       pressure[node] = sums[2 * node] / sums[2 * node + 1];
       is_known[node] = 1;
     }

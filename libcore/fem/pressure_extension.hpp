@@ -3,10 +3,14 @@
 /// Pressures where nothing is modelled, for what is looked at.
 
 #include <span>
+#include <vector>
 
 #include "mesh/mesh.hpp"
 
 namespace malleus {
+
+/// [node] 1 where some element of a viscosity touches it, on any rank. element_viscosity: [element] Pa.s. Collective.
+std::vector<char> modelled_nodes(const Mesh& mesh, std::span<const Real> element_viscosity);
 
 /// Gives the nodes that touch no modelled element (viscosity > 0) the mean of their nearest neighbours that do, layer
 /// by layer, at most 64 layers, each with what the force between them adds (grad p = f: exact at rest); nodes beyond

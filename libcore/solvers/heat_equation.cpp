@@ -46,6 +46,18 @@ BridgeEnds ends_of(const HeatBridge& bridge) {
   return ends;
 }
 
+/// visit(e, element, nodes) for each element that holds heat, element being its HeatElement.
+template <class Visit>
+void for_each_heat_element(const Mesh& mesh, Geometry geometry, const HeatScene& scene, Visit visit) {
+  with_dim(mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < mesh.elements(); ++e) {
+      if (!(scene.capacity[index(e)] > 0)) continue;
+      visit(e, heat_element<D>(simplex_points<D>(mesh, e), geometry), mesh.nodes_of_element(e));
+    }
+  });
+}
+
 NodeSpace space_of(const Communicator& comm, const Mesh& mesh, const HeatScene& scene) {
   std::vector<GlobalId> wanted;
   for (const HeatBridge& bridge : scene.bridges) {
@@ -135,14 +147,9 @@ HeatEquation::~HeatEquation() = default;
 /// Nodes whose temperature the step does not change: imposed, or of no modelled element. Their masses on the way.
 void HeatEquation::mark_fixed(const HeatScene& scene) {
   masses_.assign(index(mesh_.nodes()), 0.0);
-  with_dim(mesh_.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      if (!(scene.capacity[index(e)] > 0)) continue;
-      const auto masses = heat_element<D>(simplex_points<D>(mesh_, e), geometry_).masses;
-      for (int i = 0; i <= D; ++i) {
-        masses_[index(mesh_.nodes_of_element(e)[static_cast<std::size_t>(i)])] += scene.capacity[index(e)] * masses[i];
-      }
+  for_each_heat_element(mesh_, geometry_, scene, [&](LocalId e, const auto& element, const auto& nodes) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      masses_[index(nodes[i])] += scene.capacity[index(e)] * element.masses[static_cast<Eigen::Index>(i)];
     }
   });
   mesh_.node_halo.add_to_owners(masses_, 1);
@@ -154,18 +161,15 @@ void HeatEquation::mark_fixed(const HeatScene& scene) {
 
 void HeatEquation::add_conduction(const HeatScene& scene, std::span<const Real> temperature,
                                   std::span<Real> sums) const {
-  with_dim(mesh_.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      if (!(scene.capacity[index(e)] > 0)) continue;
-      const HeatElement<D> element = heat_element<D>(simplex_points<D>(mesh_, e), geometry_);
-      const auto nodes = mesh_.nodes_of_element(e);
-      Eigen::Matrix<Real, D + 1, 1> local;
-      for (int i = 0; i <= D; ++i) local[i] = temperature[index(nodes[static_cast<std::size_t>(i)])];
-      const Eigen::Matrix<Real, D + 1, 1> flows = scene.conductivity[index(e)] * element.stiffness * local -
-                                                  at_or_zero(scene.element_source, e) * element.masses;
-      for (int i = 0; i <= D; ++i) sums[index(nodes[static_cast<std::size_t>(i)])] += flows[i];
+  for_each_heat_element(mesh_, geometry_, scene, [&](LocalId e, const auto& element, const auto& nodes) {
+    auto local = element.masses;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      local[static_cast<Eigen::Index>(i)] = temperature[index(nodes[i])];
     }
+    const auto flows = (scene.conductivity[index(e)] * element.stiffness * local -
+                        at_or_zero(scene.element_source, e) * element.masses)
+                           .eval();
+    for (std::size_t i = 0; i < nodes.size(); ++i) sums[index(nodes[i])] += flows[static_cast<Eigen::Index>(i)];
   });
 }
 
@@ -203,20 +207,14 @@ std::vector<Real> HeatEquation::residual(const HeatScene& scene, const NodeSpace
 void HeatEquation::assemble(const HeatScene& scene, Real dt, std::span<const Real> temperature) {
   system_->start();
   std::vector<Real> conduction(index(mesh_.nodes()), 0.0);
-  with_dim(mesh_.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      if (!(scene.capacity[index(e)] > 0)) continue;
-      const HeatElement<D> element = heat_element<D>(simplex_points<D>(mesh_, e), geometry_);
-      const auto nodes = mesh_.nodes_of_element(e);
-      for (std::size_t i = 0; i <= D; ++i) {
-        const Real k = scene.conductivity[index(e)];
-        const auto row = static_cast<Eigen::Index>(i);
-        conduction[index(nodes[i])] += k * element.stiffness(row, row);
-        for (std::size_t j = 0; j <= D; ++j) {
-          system_->add(mesh_.global_node(nodes[i]), mesh_.global_node(nodes[j]),
-                       k * element.stiffness(row, static_cast<Eigen::Index>(j)));
-        }
+  for_each_heat_element(mesh_, geometry_, scene, [&](LocalId e, const auto& element, const auto& nodes) {
+    const Real k = scene.conductivity[index(e)];
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      conduction[index(nodes[i])] += k * element.stiffness(row, row);
+      for (std::size_t j = 0; j < nodes.size(); ++j) {
+        system_->add(mesh_.global_node(nodes[i]), mesh_.global_node(nodes[j]),
+                     k * element.stiffness(row, static_cast<Eigen::Index>(j)));
       }
     }
   });

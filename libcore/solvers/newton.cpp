@@ -17,8 +17,9 @@ constexpr int picard_steps = 3;
 constexpr Real forcing_factor = 0.9;
 /// Linear problems: solves that bring the flow through the gates to the tolerance, and how far each goes.
 constexpr int most_refinements = 4;
-constexpr Real gate_share = 0.3;  ///< of the linear tolerance, that the flow of a gate may be off
 constexpr Real gate_refinement = 1e-2;
+/// Of the linear tolerance, that the flow of a gate may be off, relative to what was asked.
+constexpr Real gate_share = 0.3;
 /// A share of a step is taken where the potential's slope has fallen to this share of that at the start.
 constexpr Real steepest_share = 0.5;
 

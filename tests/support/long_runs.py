@@ -8,7 +8,7 @@ import time
 
 import h5py
 import small_meshes
-from box_msh import BoxMesh
+from channel_case import AIR, CHANNEL, channel_mesh
 from runs import BIN, LAUNCH
 
 UPSETTING = """[mesh]
@@ -35,39 +35,13 @@ friction = 0.5
 [remesh]
 size = 0.12
 every = 7
-[accuracy]
-two_meshes = no
-[output]
-every = 3
-[checkpoint]
-every = 2
 """
 
-FILLING = """[mesh]
-file = channel.msh
-[time]
+FILLING = CHANNEL + AIR + """[time]
 end = 0.6 s
 step = {step}
-[fluid.polymer]
-viscosity = 1000
-[fluid.air]
-viscosity = 0.1
-[initial]
-fluid = air
-[initial.start]
-fluid = polymer
-level_set = "0.004 - x"
-[inlet.gate]
-group = cavity_x_low
-fluid = polymer
-flow_rate = 8e-5
-[vent.outlet]
-group = cavity_x_high
-[wall.lower]
-group = cavity_y_low
-[wall.upper]
-group = cavity_y_high
-[accuracy]
+"""
+OFTEN = """[accuracy]
 two_meshes = no
 [output]
 every = 3
@@ -84,12 +58,10 @@ def write_case(program, directory, increments=60, extra=""):
     if program == "forge":
         (directory / "box.msh").write_text(small_meshes.box(2, 5).msh())
     else:
-        mesh = BoxMesh(2)
-        mesh.add("cavity", [0.0, 0.0], [0.016, 0.004], [16, 4])
-        mesh.write(directory / "channel.msh")
+        channel_mesh(directory / "channel.msh", 4)
     whole = 0.5 if program == "forge" else 0.6
     case = directory / f"{program}.ini"
-    case.write_text(TEXTS[program].format(step=whole / increments) + extra)
+    case.write_text(TEXTS[program].format(step=whole / increments) + OFTEN + extra)
     return case
 
 

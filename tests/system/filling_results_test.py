@@ -6,7 +6,7 @@ import unittest
 import h5py
 import numpy as np
 
-from filling_test import AIR, CHANNEL, ETA, H, U, channel_mesh
+from channel_case import AIR, CHANNEL, ETA, H, U, channel_mesh
 from runs import history, run, summary
 
 VOID = AIR.replace("viscosity = 0.1", "law = void")

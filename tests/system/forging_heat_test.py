@@ -6,7 +6,7 @@ import h5py
 import numpy
 
 from box_msh import BoxMesh
-from forging import Forging, K, box_mesh, case_text, flow_stress
+from forging import Forging, K, box_mesh, case_text
 from runs import summary
 
 DENSITY, CAPACITY, CONDUCTIVITY = 7800.0, 700.0, 30.0

@@ -108,7 +108,7 @@ class WrongScenes(Forging):
         line = text[:text.index("group = billet_y_high")].count("\n") + 1
         second = text + "[boundary.again]\ngroup = billet_y_high\ntraction = 0 1 Pa\n"
         self.refused(second, f"case.ini:{second.count(chr(10)) - 1}: [boundary.again] group = billet_y_high",
-                     f"already that of [boundary.high] (", f"case.ini:{line})")
+                     "already that of [boundary.high] (", f"case.ini:{line})")
         self.refused(text + "[body.other]\ngroup = billet\nlaw = rigid\n", "[body.other] group = billet",
                      "already that of [body.billet] (")
 

@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 import small_meshes
-from box_msh import BoxMesh
+from channel_case import AIR, CHANNEL, channel_mesh
 from runs import history, run
 
 FORGE = pathlib.Path(os.environ["MALLEUS_BIN"]) / "forge"
@@ -98,32 +98,6 @@ class Remeshing(unittest.TestCase):
             self.assertAlmostEqual(a["force_upper_y_N"] / b["force_upper_y_N"], 1, delta=1e-4)
 
 
-CHANNEL = """[mesh]
-file = channel.msh
-[time]
-end = 0.25 s
-[fluid.polymer]
-viscosity = 1000
-[fluid.air]
-viscosity = 0.1
-[initial]
-fluid = air
-[initial.start]
-fluid = polymer
-level_set = "0.004 - x"
-[inlet.gate]
-group = cavity_x_low
-fluid = polymer
-flow_rate = 8e-5
-[vent.outlet]
-group = cavity_x_high
-[wall.lower]
-group = cavity_y_low
-[wall.upper]
-group = cavity_y_high
-"""
-
-
 class FollowingTheFront(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -131,11 +105,9 @@ class FollowingTheFront(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def fill(self, name, across, remesh="", ranks=1):
-        mesh = BoxMesh(2)
-        mesh.add("cavity", [0.0, 0.0], [0.016, 0.004], [4 * across, across])
-        mesh.write(self.folder / "channel.msh")
+        channel_mesh(self.folder / "channel.msh", across)
         case = self.folder / f"{name}.ini"
-        case.write_text(CHANNEL + remesh)
+        case.write_text(CHANNEL + AIR + "[time]\nend = 0.25 s\n" + remesh)
         run("inject", case, self.folder / name, ranks=ranks)
         return history(self.folder / name)
 

@@ -10,7 +10,7 @@ import unittest
 import numpy as np
 
 from box_msh import BoxMesh
-from filling_test import AIR, CHANNEL, ETA, H, SLOPE, U, channel_mesh
+from channel_case import AIR, CHANNEL, ETA, H, SLOPE, U, channel_mesh
 from runs import history, run, summary
 
 ATMOSPHERE = 101325.0
