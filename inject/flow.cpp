@@ -305,10 +305,12 @@ void Flow::note_freezing(std::span<const Real> old_velocity) {
   const std::span<const Real> velocity = scene_.fields["velocity"].values();
   std::vector<Real> change(velocity.begin(), velocity.end());
   for (std::size_t i = 0; i < change.size(); ++i) change[i] -= old_velocity[i];
-  Real largest = 0;
+  constexpr int root_mean_square = 2;
+  Real largest = 0;  // of the fronts
   for (std::size_t i = 0; i < fronts_.size(); ++i) {
     const std::span<const Real> level_set = std::as_const(fronts_).values(i);
-    largest = std::max(largest, front_crossing_rate(scene_.comm, scene_.mesh, scene_.node_sizes, change, level_set));
+    largest = std::max(
+        largest, front_crossing_rate(scene_.comm, scene_.mesh, scene_.node_sizes, change, level_set, root_mean_square));
   }
   freezing_error_ += 0.5 * state_.seconds_since_flow * largest;
 }

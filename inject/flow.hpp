@@ -38,7 +38,7 @@ class Flow final : public Component {
   const LinearTotals& linear_totals() const { return totals_; }
   bool pressure_is_free() const { return pressure_is_free_; }
   /// Distance [elements] that freezing the flow between solves misplaced the front, summed over the solves: half of the
-  /// time between two solves times the change of the normal velocity.
+  /// time between two solves times the root mean square over the front of the change of its normal velocity.
   Real freezing_error() const { return freezing_error_; }
   /// Largest step [s] that trapped gas allows.
   Real largest_step() const { return void_ ? void_->largest_step() : std::numeric_limits<Real>::infinity(); }

@@ -9,8 +9,6 @@
 namespace malleus {
 namespace {
 
-constexpr int power = 8;
-
 /// Whether the level set changes its sign in the element, or is zero at some node: the front may stand on a gate.
 bool is_touched(const Mesh& mesh, LocalId element, std::span<const Real> level_set) {
   bool has_inside = false;
@@ -48,7 +46,7 @@ std::vector<Real> node_sizes(const Mesh& mesh) {
 }
 
 Real front_crossing_rate(const Communicator& comm, const Mesh& mesh, std::span<const Real> sizes,
-                         std::span<const Real> velocity, std::span<const Real> level_set) {
+                         std::span<const Real> velocity, std::span<const Real> level_set, int power) {
   std::array<Real, 2> sums = {0, 0};  // area times rate^power, area
   with_dim(mesh.dim, [&](auto d) {
     constexpr int D = decltype(d)::value;
