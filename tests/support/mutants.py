@@ -7,8 +7,11 @@ import time
 
 from runs import BIN, LAUNCH
 
+PATIENCE = 10  # seconds that an answer may take on a machine with other work
 PIECES = ["[", "]", "=", '"', ";", "#", "\n", "\r", "\t", ".", "^", "(", ")", "/", "-", "1e", "nan", "inf", "free", "\xff", "\0",
           "1e999", "-1", "0", "[body.", "[fluid.x]\n", "MPa", "s^m", "?:", "&&", "sin(", "x", "99999999999", " "]
+VALUES = ["0", "-1", "1", "2", "3", "7", "0.5", "1e-3", "1e-9", "1e3", "1e9", "1e-300", "1e300", "2147483648", "yes", "no", "auto",
+          "sharp", "trace", "measured", "fine", "draft", "tresca", "coulomb", "hammer", "void", "rigid", "newtonian", "cross"]
 CASES = {
     "forge": """[mesh]
 file = square.msh
@@ -20,6 +23,9 @@ group = part
 law = norton-hoff
 consistency = 10 Pa.s^m
 rate_sensitivity = 0.4
+density = 7800 kg/m3
+conductivity = 25
+heat_capacity = 600
 [boundary.bottom]
 group = bottom
 velocity = free 0
@@ -29,12 +35,42 @@ point = 0 1 m
 normal = 0 -1
 velocity = 0 -1 mm/s
 friction = 0.3
+friction_law = tresca
+temperature = 300
+heat_transfer = 1000
+[tool.ball]
+shape = sphere
+point = 0.5 2 m
+radius = 0.3 m
+velocity = 0 -2 mm/s
+[thermal]
+initial = 1100
+[gravity]
+acceleration = 0 -9.81
 [remesh]
 size = 0.2 m
+gradation = 1.4
 [solver]
 newton_tolerance = 1e-5
+max_newton = 40
+[penalty]
+penalty = 1e4
+[motion]
+scheme = euler
+[accuracy]
+level = draft
+[probe.middle]
+point = 0.5 0.5
+fields = velocity pressure
 [output]
 every = 2
+precision = float64
+[checkpoint]
+every = 5
+[limits]
+memory = 4 GiB
+[partition]
+balance = counted
 [body_force]
 x = "sin(_pi*x)"
 """,
@@ -46,16 +82,26 @@ increments = 3
 law = power-law
 consistency = 1000
 exponent = 0.6
+density = 900
 [fluid.air]
 viscosity = 0.1 Pa.s
+density = 1.2
 [initial]
 fluid = air
+[initial.drop]
+fluid = melt
+shape = sphere
+center = 0.2 0.5
+radius = 0.1
 [inlet.gate]
 group = left
 fluid = melt
 flow_rate = 1 cm3/s
+switch_pressure = 1 MPa
+then_pressure = 1 MPa
 [vent.out]
 group = right
+pressure = 1 bar
 [wall.bottom]
 group = bottom
 condition = slip
@@ -64,6 +110,20 @@ group = top
 [front]
 mixture = fraction
 cfl = 0.5
+thickness = 1
+[flow]
+update = every 2
+[gravity]
+acceleration = 0 -9.81
+[remesh]
+size = 0.3
+[reference]
+velocity_x = "y*(1-y)"
+at = end
+[accuracy]
+level = fine
+[output]
+fields = velocity level_set
 [limits]
 wall_time = 2 h
 """,
@@ -91,6 +151,32 @@ def damage(text, dice):
     return text
 
 
+def bend(text, dice):
+    """Values, keys and sections of the right form that say something else: often still a case, and then a strange one."""
+    for _ in range(dice.randint(1, 3)):
+        lines = text.splitlines()
+        titles = [i for i, line in enumerate(lines) if line.startswith("[")]
+        keys = [i for i, line in enumerate(lines) if "=" in line]
+        kind = dice.randrange(4)
+        at = dice.choice(keys)
+        if kind == 0:
+            lines[at] = lines[at].split("=")[0] + "= " + dice.choice(VALUES)
+        elif kind == 1:
+            numbers = [i for i in keys if re.search(r"\d", lines[i])]
+            at = dice.choice(numbers)
+            lines[at] = re.sub(r"\d+(\.\d+)?", lambda _: dice.choice(VALUES[:14]), lines[at], count=1)
+        elif kind == 2:
+            begin = dice.choice(titles)
+            end = next((i for i in titles if i > begin), len(lines))
+            del lines[begin:end]
+        else:
+            del lines[at]
+        text = "\n".join(lines) + "\n"
+        if "=" not in text:
+            break
+    return text
+
+
 def spoil(text, dice):
     """One mistake that makes the case wrong whatever else it says."""
     lines = text.splitlines()
@@ -115,20 +201,34 @@ def spoil(text, dice):
     return "\n".join(lines) + "\n"
 
 
-class Checker:
-    """Writes mutants into a directory and runs --check on them."""
+def mutant(program, seed, number):
+    """The text of a mutant, the same at each call, and whether it must be refused."""
+    dice = random.Random(f"{program} {seed} {number}")
+    how = dice.choice((spoil, damage, bend))
+    return how(CASES[program], dice), how is spoil
 
-    def __init__(self, directory, mesh, seed):
+
+class Answers:
+    """Exit codes and times of many answers."""
+
+    def __init__(self):
+        self.codes = {0: 0, 2: 0}
+        self.slowest = 0.0
+
+    def add(self, code, seconds):
+        self.codes[code] = self.codes.get(code, 0) + 1
+        self.slowest = max(self.slowest, seconds)
+
+
+class Checker:
+    """Runs --check on case texts in a directory of its own."""
+
+    def __init__(self, directory, mesh):
         self.directory = pathlib.Path(directory)
         (self.directory / "square.msh").write_text(mesh)
-        self.dice = random.Random(seed)
-        self.slowest = 0.0
-        self.codes = {0: 0, 2: 0}
 
-    def try_one(self, program, ranks=1):
-        """What is wrong with the program's answer to the next mutant; None where nothing is."""
-        is_wrong = self.dice.random() < 0.3
-        text = (spoil if is_wrong else damage)(CASES[program], self.dice)
+    def judge(self, program, text, is_wrong, answers, ranks=1):
+        """What is wrong with the program's answer to the text; None where nothing is."""
         case = self.directory / "case.ini"
         case.write_bytes(text.encode("latin-1"))
         began = time.monotonic()
@@ -137,12 +237,14 @@ class Checker:
                                     capture_output=True, timeout=60, cwd=self.directory)
         except subprocess.TimeoutExpired:
             return f"{program} hangs on {ranks} ranks:\n{text}"
-        self.slowest = max(self.slowest, time.monotonic() - began)
-        self.codes[result.returncode] = self.codes.get(result.returncode, 0) + 1
+        seconds = time.monotonic() - began
+        answers.add(result.returncode, seconds)
         said = result.stderr.decode(errors="replace")
         if result.returncode not in (0, 2) or (is_wrong and result.returncode != 2):
             return f"{program} ended with {result.returncode} on {ranks} ranks:\n{said}\n{text}"
         if result.returncode == 2 and "error: " not in said:
             return f"{program} refused without a word on {ranks} ranks:\n{text}"
+        if seconds > PATIENCE:
+            return f"{program} took {seconds:.0f} s on {ranks} ranks:\n{text}"
         left = sorted(path.name for path in self.directory.iterdir() if path.name not in ("case.ini", "square.msh"))
         return f"{program} --check wrote {left}:\n{text}" if left else None

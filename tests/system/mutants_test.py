@@ -2,7 +2,7 @@
 import tempfile
 import unittest
 
-from mutants import Checker
+import mutants
 from wrong_input_test import MESH
 
 
@@ -11,10 +11,19 @@ class Mutants(unittest.TestCase):
         for ranks, count in ((1, 40), (3, 4)):
             for program in ("forge", "inject"):
                 with self.subTest(program, ranks=ranks), tempfile.TemporaryDirectory() as directory:
-                    checker = Checker(directory, MESH, f"{program} {ranks}")
-                    for _ in range(count):
-                        self.assertIsNone(checker.try_one(program, ranks))
-                    self.assertGreater(checker.codes[2], count // 4)
+                    checker, answers = mutants.Checker(directory, MESH), mutants.Answers()
+                    for number in range(count):
+                        text, is_wrong = mutants.mutant(program, ranks, number)
+                        self.assertIsNone(checker.judge(program, text, is_wrong, answers, ranks))
+                    self.assertGreater(answers.codes[2], count // 4)
+
+    def test_what_is_not_mutated_is_accepted(self):
+        """Else nothing would be learnt from mutants that are refused."""
+        for program in ("forge", "inject"):
+            with self.subTest(program), tempfile.TemporaryDirectory() as directory:
+                answers = mutants.Answers()
+                self.assertIsNone(mutants.Checker(directory, MESH).judge(program, mutants.CASES[program], False, answers))
+                self.assertEqual(answers.codes[0], 1)
 
 
 if __name__ == "__main__":
