@@ -60,7 +60,7 @@ void CaseReader::describe(std::string_view kind, Occurrence occurrence, int at_l
   description.text = text;
   for (const Key& key : section.keys()) {
     const std::string default_text = key.print();
-    check_own_values(description.title(), key);
+    if (comm_ == nullptr) check_own_values(description.title(), key);
     Key& described = description.keys.emplace_back(key);
     described.default_text = default_text;
     described.assign = nullptr;

@@ -47,10 +47,10 @@
 ///     reader.check_mesh({dimension, volume_groups, surface_groups});   // the same for what needs the mesh
 ///     write(reader.resolved(output_directory));
 ///
-/// A default (of a key that is not required) and a starter must be values that the key itself accepts, else describing
-/// throws a Defect.
-///
 /// With a default-constructed CaseReader nothing is read and the same describe() only documents: see help.hpp.
+/// This also tests the description, once instead of at each reading:
+/// a default (of a key that is not required) and a starter must be values that the key itself accepts,
+/// else it throws a Defect.
 
 #include <filesystem>
 #include <optional>

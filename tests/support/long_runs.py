@@ -50,10 +50,34 @@ every = 2
 """
 PROGRAMS = ("forge", "inject")
 TEXTS = {"forge": UPSETTING, "inject": FILLING}
+# With every kind of component that a scene of one body, or one of two fluids, can have.
+EVERYTHING = {
+    "forge": """density = 7800
+conductivity = 30
+heat_capacity = 600
+[thermal]
+initial = 1300
+[gravity]
+acceleration = 0 -9.81
+[probe.middle]
+point = 0.5 0.4
+fields = velocity temperature
+moves = with-material
+""",
+    "inject": """[gravity]
+acceleration = 0 -9.81
+[remesh]
+size = 1 mm
+every = 3
+[probe.middle]
+point = 0.005 0.002
+fields = velocity pressure
+""",
+}
 
 
 def write_case(program, directory, increments=60, extra=""):
-    """A case of about so many increments in the directory; its path."""
+    """A case of about so many increments in the directory, with more sections behind it; its path."""
     directory = pathlib.Path(directory)
     if program == "forge":
         (directory / "box.msh").write_text(small_meshes.box(2, 5).msh())
@@ -62,6 +86,19 @@ def write_case(program, directory, increments=60, extra=""):
     whole = 0.5 if program == "forge" else 0.6
     case = directory / f"{program}.ini"
     case.write_text(TEXTS[program].format(step=whole / increments) + OFTEN + extra)
+    return case
+
+
+def write_full_case(program, directory, increments=60):
+    """A case of about so many increments that has all kinds of components; its path."""
+    case = write_case(program, directory, increments)
+    if program == "forge":
+        body, rest = EVERYTHING["forge"].split("[thermal]")
+        text = case.read_text().replace("rate_sensitivity = 0.5\n", "rate_sensitivity = 0.5\n" + body) + "[thermal]" + rest
+    else:
+        text = case.read_text().replace("viscosity = 1000.0\n", "viscosity = 1000.0\ndensity = 900\n")
+        text = text.replace("viscosity = 0.1\n", "viscosity = 0.1\ndensity = 1\n") + EVERYTHING["inject"]
+    case.write_text(text.replace("two_meshes = no\n", ""))
     return case
 
 

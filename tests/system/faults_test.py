@@ -14,7 +14,7 @@ import unittest
 
 import long_runs
 from long_runs import (PROGRAMS, check_sound, digits, finish, kill, rows_so_far, start, wait_for_rows, wait_for_writing,
-                       write_case)
+                       write_case, write_full_case)
 
 JUMPING_CLOCK = r"""
 #include <stdlib.h>
@@ -92,6 +92,23 @@ class Kills(LongRuns):
                 self.assert_same_digits(self.run_to_end(program, case, output.name, "--restart", ranks=2), whole)
                 other = self.run_to_end(program, case, f"{program}-elsewhere", "--restart", ranks=3)
                 self.assert_near(other, whole)
+
+    def test_heat_tracers_and_remeshing_go_on_to_the_same_digits(self):
+        for program in PROGRAMS:
+            with self.subTest(program):
+                case = write_full_case(program, self.directory, 12)
+                whole = self.run_to_end(program, case, f"{program}-whole", ranks=2)
+                parts = self.directory / f"{program}-parts"
+                code, said = finish(start(program, case, parts, "--steps", "5", ranks=2))
+                self.assertEqual(code, 0, said)
+                self.run_to_end(program, case, parts.name, "--restart", ranks=2)
+                self.assert_same_digits(parts, whole)
+                probes = [(output / "probe-middle.csv").read_text() for output in (whole, parts)]
+                self.assertGreater(probes[0].count("\n"), 12)
+                self.assertEqual(*probes)
+                if program == "forge":
+                    temperatures = [float(row[digits(whole)[0].index("temperature_billet_K")]) for row in digits(whole)[1:]]
+                    self.assertGreater(temperatures[-1], temperatures[0])
 
     def test_checkpoints_change_no_digit(self):
         for program in PROGRAMS:
