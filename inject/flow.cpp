@@ -40,6 +40,7 @@ Flow::Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state
   scene_.fields.declare(scene_.mesh, {"strain_rate", "1/s", Support::element, 1, Transfer::interpolate, true});
   scene_.fields.declare(scene_.mesh, {"shear_rate", "1/s", Support::element, 1, Transfer::recompute, true});
   scene_.fields.declare(scene_.mesh, {"wall_shear_stress", "Pa", Support::node, 1, Transfer::recompute, true});
+  if (scene.settings.common.inertia) history_.emplace(scene);
   if (mixture.has_void()) void_.emplace(scene, fronts, mixture);
   rebuild();
 }
@@ -52,6 +53,7 @@ std::string Flow::purpose() const {
     const Real distance = scene_.settings.flow.update_distance;
     when = distance > 0 ? fmt::format("when the front has moved {:g} elements", distance) : "every increment";
   }
+  if (history_) return "solves the Navier-Stokes equations every increment";
   return fronts_.size() == 0 ? "solves the Stokes equations"
                              : fmt::format("solves the Stokes equations of the mixture, {}", when);
 }
@@ -84,8 +86,22 @@ void Flow::refuse_blocked_vents() const {
 }
 
 void Flow::start() {
+  if (history_) return start_from_rest();
   const Outcome outcome = solve(0, 0);
   if (outcome.kind != Outcome::Kind::done) throw NumericsError("flow: " + outcome.why);
+}
+
+/// The velocities are those that are imposed, and zero.
+void Flow::start_from_rest() {
+  refresh_mixture();
+  if (void_) void_->find(0);
+  const std::vector<GateDrive> drives = present_drives(0);
+  prepare(drives, 0, 0);
+  unknowns_ = {};
+  unknowns_.nodes.assign(static_cast<std::size_t>(scene_.mesh.nodes()) * (scene_.mesh.dim + 1), 0.0);
+  operator_->impose_constraints(unknowns_);
+  publish(drives, {});
+  scene_.subscale_velocity.clear();
 }
 
 void Flow::check_conditions() {
@@ -100,6 +116,7 @@ Outcome Flow::solve_once() {
 }
 
 Outcome Flow::advance(const Increment& increment) {
+  if (history_) return advance_inertia(increment);
   state_.flow_updated = increment.number == 1;  // start() solved it for this increment
   ++state_.increments_since_flow;
   if (is_due(present_drives(increment.start()))) {
@@ -110,6 +127,26 @@ Outcome Flow::advance(const Increment& increment) {
   state_.seconds_since_flow += increment.dt;
   state_.time = increment.time;
   return Outcome::done();
+}
+
+Outcome Flow::advance_inertia(const Increment& increment) {
+  const auto velocity = scene_.fields["velocity"].values();
+  const auto earlier = scene_.fields["velocity_before"].values();
+  before_ = {unknowns_, {velocity.begin(), velocity.end()}, {earlier.begin(), earlier.end()}, history_->save()};
+  const Outcome outcome = solve(increment.time, increment.dt);
+  if (outcome.kind != Outcome::Kind::done) return Outcome::retry(outcome.why);
+  history_->accept(before_.velocity, increment.dt);
+  state_.flow_updated = true;
+  state_.time = increment.time;
+  return Outcome::done();
+}
+
+void Flow::roll_back() {
+  if (!history_) return;
+  unknowns_ = before_.unknowns;
+  scene_.fields["velocity"].assign(before_.velocity);
+  scene_.fields["velocity_before"].assign(before_.earlier);
+  history_->load(before_.history);
 }
 
 std::vector<GateDrive> Flow::present_drives(Real time) {
@@ -194,7 +231,7 @@ Outcome Flow::solve(Real time, Real dt) {
   Outcome outcome = solve_with(drives, time, dt);
   if (outcome.kind == Outcome::Kind::done && switch_over(drives)) outcome = solve_with(drives, time, dt);
   if (outcome.kind != Outcome::Kind::done) return outcome;
-  if (was_solved) note_freezing(old_velocity);
+  if (was_solved && !history_) note_freezing(old_velocity);
   is_asked_ = false;
   state_.filled_at_flow = state_.filled;
   state_.travelled = 0;
@@ -225,7 +262,7 @@ NewtonOptions Flow::newton_options() const {
   options.tolerance = solver.newton_tolerance;
   options.linear_tolerance = solver.linear_tolerance;
   options.max_iterations = solver.max_newton;
-  options.start_shear_rate = typical_shear_rate(scene_);
+  if (!history_ || !is_solved_) options.start_shear_rate = typical_shear_rate(scene_);
   return options;
 }
 
@@ -235,6 +272,7 @@ std::vector<std::size_t> Flow::prepare(const std::vector<GateDrive>& drives, Rea
   operator_->set_constraints(std::move(conditions.constraints));
   operator_->set_loads(std::move(conditions.loads));
   operator_->set_gates(std::move(conditions.gates));
+  if (history_) operator_->set_inertia(history_->inertia(mixture_, dt));
   operator_->prepare();
   pressure_is_free_ = operator_->pressure_is_free();
   return conditions.gate_inlets;
@@ -318,6 +356,7 @@ void Flow::note_freezing(std::span<const Real> old_velocity) {
 nlohmann::json Flow::save() const {
   nlohmann::json saved = {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}};
   if (void_) saved["void"] = void_->save();
+  if (history_) saved["history"] = history_->save();
   return saved;
 }
 
@@ -339,6 +378,10 @@ void Flow::load(const nlohmann::json& saved) {
   prepare(drives, state_.time, 0);
   if (void_) void_->load(saved.at("void"));
   operator_->update_viscosity(unknowns_);
+  if (history_) {
+    history_->load(saved.at("history"));
+    return;  // the subscales come with save_local(), or with the next solve, which is before they are wanted
+  }
   scene_.subscale_velocity = operator_->subscale_velocity(unknowns_);
 }
 

@@ -10,6 +10,7 @@
 #include "engine/process.hpp"
 #include "inject/filling_state.hpp"
 #include "inject/flow_conditions.hpp"
+#include "inject/flow_history.hpp"
 #include "inject/front_set.hpp"
 #include "inject/void_model.hpp"
 #include "solvers/newton.hpp"
@@ -17,7 +18,9 @@
 namespace malleus::inject {
 
 /// Solves the Stokes equations for the mixture (paper, eq. [1] with [9]) when the front has moved far enough since the
-/// last solve, and keeps the flow in between. Fields: velocity, pressure, viscosity, strain_rate. Void: see VoidModel.
+/// last solve, and keeps the flow in between. With inertia it solves the Navier-Stokes equations, every increment, for
+/// the velocity at its end, and starts from rest. Fields: velocity, pressure, viscosity, strain_rate. Void: see
+/// VoidModel.
 class Flow final : public Component {
  public:
   Flow(Scene& scene, Mixture& mixture, FrontSet& fronts, FillingState& state);
@@ -27,6 +30,7 @@ class Flow final : public Component {
   FieldUse uses() const override;
   void start() override;
   Outcome advance(const Increment& increment) override;
+  void roll_back() override;
   Outcome solve_once() override;
 
   /// After the mesh and the fields were replaced. Collective.
@@ -54,6 +58,7 @@ class Flow final : public Component {
 
  private:
   std::vector<GateDrive> present_drives(Real time);
+  Outcome advance_inertia(const Increment& increment);
   bool is_due(const std::vector<GateDrive>& drives);
   bool dissipation_changed();
   void refuse_blocked_vents() const;
@@ -68,6 +73,7 @@ class Flow final : public Component {
   StickingNodes sticking_nodes() const;
   void note_freezing(std::span<const Real> old_velocity);
   NewtonOptions newton_options() const;
+  void start_from_rest();
 
   Scene& scene_;
   Mixture& mixture_;
@@ -77,6 +83,13 @@ class Flow final : public Component {
   StokesLinearSolver linear_;
   StokesState unknowns_;
   std::optional<VoidModel> void_;
+  std::optional<FlowHistory> history_;  ///< with inertia
+  struct Before {
+    StokesState unknowns;
+    std::vector<Real> velocity, earlier;
+    nlohmann::json history;
+  };
+  Before before_;  ///< the increment, with inertia: for roll_back()
   LinearTotals totals_;
   bool is_solved_ = false;
   bool is_asked_ = false;

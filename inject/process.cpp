@@ -115,7 +115,8 @@ void FillingProcess::add_filling() {
 }
 
 std::vector<LeftOut> FillingProcess::left_out() const {
-  std::vector<LeftOut> left = {{"heat equation", "no [thermal] section"}, {"inertia", "no [inertia] section"}};
+  std::vector<LeftOut> left = {{"heat equation", "no [thermal] section"}};
+  if (!scene_.settings.common.inertia) left.push_back({"inertia", "no [inertia] section"});
   if (!scene_.settings.common.gravity) left.push_back({"weight", "no [gravity] section"});
   if (!has_fronts()) left.push_back({"front, mixture, filling", "one fluid"});
   if (prescribed_) left.push_back({"Stokes equations", "[flow] prescribes the velocity"});

@@ -317,6 +317,24 @@ bool InjectCase::is_driven() const {
          std::any_of(common.boundaries.begin(), common.boundaries.end(), acts);
 }
 
+void InjectCase::check_inertia(CaseReader& reader) const {
+  for (const FluidSettings& fluid : fluids) {
+    if (!fluid.density && fluid.law != FluidSettings::Law::empty) {
+      reader.fail("fluid." + fluid.name, "density", "[inertia] wants the density of every fluid");
+    }
+  }
+  if (flow.is_prescribed()) reader.fail("inertia", "", "a prescribed flow has none; remove the section");
+  if (flow.update.kind != FlowUpdate::Kind::automatic) {
+    reader.fail("flow", "update", "with [inertia] the flow is solved every increment; use auto");
+  }
+  if (common.solver.linear_method == LinearChoice::conjugate_residual) {
+    reader.fail("solver", "linear_method", "[inertia] makes the equations unsymmetric; use another method");
+  }
+  if (time.increments != 0 && !time.step) {
+    reader.fail("time", "step", "must be given with [inertia]: the flow starts from rest, which tells no step");
+  }
+}
+
 void InjectCase::check(CaseReader& reader) const {
   if (is_driven() && fluids.size() > 1 && inlets.empty() && shapes.empty() && time.increments != 0) {
     reader.fail("inlet", "",
@@ -343,7 +361,7 @@ void InjectCase::check(CaseReader& reader) const {
   };
   refuse(common.thermal.has_value(), "thermal", "inject models no heat yet; remove the section");
   common.refuse_heat_without_thermal(reader);
-  refuse(common.inertia.has_value(), "inertia", "inject models no inertia yet; remove the section");
+  if (common.inertia) check_inertia(reader);
   refuse(common.air && (!is_mixture || fluids[static_cast<std::size_t>(std::max(0, initial_fluid()))].law !=
                                            FluidSettings::Law::empty),
          "air", "is about air that is not modelled as a fluid: [initial] fluid needs law = void");

@@ -23,9 +23,11 @@ struct BorderColumn {
 
 /// Unknowns and equations of a linear solve.
 ///
-///     [ A   B^T  g ] [dv]   [r_v]      A symmetric positive on the free directions (viscous, friction, penalty)
+///     [ A   B^T  g ] [dv]   [r_v]      A positive on the free directions (viscous, friction, penalty, inertia)
 ///     [ B+E -C   0 ] [dp] = [r_p]      B = -(q, div v): r_p in m^3/s times the scale; E of Newton's tangent only
 ///     [ g^T  0   d ] [dq]   [r_q]      C from the subscales, >= 0
+///
+/// A is symmetric but for convection, which also adds to B^T and B.
 ///
 /// `matrix` holds [A B^T; B -C] in blocks of dim+1 a node, (v_1..v_dim, p): MATSEQBAIJ on one rank, MATMPIBAIJ on
 /// several. Rows and columns are the global node numbers of the mesh; a rank has the rows of the nodes it owns.
@@ -41,6 +43,8 @@ struct LinearSystem {
   const NodeConstraints* constraints = nullptr;  ///< of the mesh's local nodes: owned, then copies
   std::span<const Real> element_viscosity;       ///< [element] Pa.s; 0 = not modelled, adds nothing to the matrix
   std::span<const Real> element_volume;          ///< [element] m^3; in axisymmetric scenes of the whole ring
+  /// [element] kg/(m^3 s), density times the rate of dv/dt: what resists beside the viscosity; empty = nothing.
+  std::span<const Real> element_inertia;
   std::vector<BorderColumn> borders;
   Real pressure_scale = 1;
   bool axisymmetric = false;

@@ -79,6 +79,22 @@ ElementLoad<Element::dim> StokesOperator::element_load(LocalId element) const {
   return load;
 }
 
+template <int D>
+InertiaElement<D> StokesOperator::inertia_of(LocalId element, const ElementUnknowns<D>& unknowns) const {
+  const auto e = static_cast<std::size_t>(element);
+  ElementInertia<D> inertia;
+  inertia.density = inertia_->density[e];
+  inertia.rate = inertia_->rate;
+  if (!inertia_->history.empty()) {
+    const auto nodes = mesh_->nodes_of_element(element);
+    for (int a = 0; a <= D; ++a) {
+      const auto node = static_cast<std::size_t>(nodes[static_cast<std::size_t>(a)]);
+      inertia.history.col(a) = Eigen::Map<const Point<D>>(inertia_->history.data() + node * D);
+    }
+  }
+  return {simplex_points<D>(*mesh_, element), geometry_, inertia, unknowns.velocity, viscosity_[e]};
+}
+
 template <class Element>
 void StokesOperator::add_elements(std::span<const Real> unknowns, Balance& sums) const {
   constexpr int D = Element::dim;
@@ -90,6 +106,10 @@ void StokesOperator::add_elements(std::span<const Real> unknowns, Balance& sums)
     const ElementUnknowns<D> values = gather<D>(*mesh_, e, unknowns);
     scatter<D>(*mesh_, e, element.residual(values, viscosity, viscosity), 1, sums.internal);
     if (loaded) scatter<D>(*mesh_, e, element.load(element_load<Element>(e), viscosity), -1, sums.external);
+    if (inertia_) {
+      const ElementLoad<D> load = element_load<Element>(e);
+      scatter<D>(*mesh_, e, inertia_of<D>(e, values).residual(values, load), 1, sums.internal);
+    }
     const Real size = viscosity * std::pow(element.volume(), (D - 2.0) / D);
     sums.roundoff += size * size * values.velocity.squaredNorm();
   }
@@ -237,7 +257,10 @@ void StokesOperator::add_element_matrices(const StokesState& state, Tangent kind
     const Real slope = kind == Tangent::picard ? 0 : slope_[i];
     const TangentFactors factors{viscosity_[i], slope, system_.pressure_scale};
     element.matrix(unknowns.velocity, factors, local);
-    if (kind == Tangent::newton && slope != 0) {
+    if (inertia_) {
+      inertia_of<D>(e, unknowns)
+          .add_matrix(unknowns, element_load<Element>(e), kind != Tangent::picard, system_.pressure_scale, local);
+    } else if (kind == Tangent::newton && slope != 0) {
       element.add_subscale_slope(unknowns, element_load<Element>(e), factors, local);
     }
     const auto nodes = mesh_->nodes_of_element(e);
@@ -285,6 +308,11 @@ const LinearSystem& StokesOperator::tangent(const StokesState& state, Tangent ki
   system_.constraints = &constraints_;
   system_.element_viscosity = viscosity_;
   system_.element_volume = volume_;
+  inertia_rate_.clear();
+  if (inertia_) {
+    for (const Real density : inertia_->density) inertia_rate_.push_back(density * inertia_->rate);
+  }
+  system_.element_inertia = inertia_rate_;
   system_.axisymmetric = geometry_ == Geometry::axisymmetric;
   system_.pressure_is_free = pressure_is_free_;
   ++system_.value_version;
@@ -349,8 +377,10 @@ std::vector<Real> StokesOperator::subscale_velocity(const StokesState& state) co
       const auto i = static_cast<std::size_t>(e);
       if (!(viscosity_[i] > 0)) continue;
       const MiniElement<D> element(simplex_points<D>(*mesh_, e));
-      Eigen::Map<Point<D>>(result.data() + i * D) =
-          element.subscale_velocity(gather<D>(*mesh_, e, state.nodes), element_load<MiniElement<D>>(e), viscosity_[i]);
+      const ElementUnknowns<D> values = gather<D>(*mesh_, e, state.nodes);
+      const ElementLoad<D> load = element_load<MiniElement<D>>(e);
+      Eigen::Map<Point<D>>(result.data() + i * D) = inertia_ ? inertia_of<D>(e, values).subscale_velocity(values, load)
+                                                             : element.subscale_velocity(values, load, viscosity_[i]);
     }
   });
   return result;

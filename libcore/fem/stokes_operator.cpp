@@ -291,7 +291,7 @@ void StokesOperator::restore_viscosity(std::span<const Real> viscosity, std::spa
 }
 
 bool StokesOperator::is_linear() const {
-  return model_->is_linear() &&
+  return !inertia_ && model_->is_linear() &&
          std::all_of(terms_.begin(), terms_.end(), [](const ResidualTerm* term) { return term->is_linear(); });
 }
 

@@ -3,8 +3,10 @@
 /// Residual and tangent of the Stokes equations on the mesh, with what acts on body and boundary.
 
 #include <memory>
+#include <optional>
 
 #include "fem/facet.hpp"
+#include "fem/inertia_element.hpp"
 #include "fem/linear_system.hpp"
 #include "fem/residual_term.hpp"
 #include "fem/stokes_mini.hpp"
@@ -47,6 +49,13 @@ struct FluxGate {
   Real reference = 0;               ///< Pa
 };
 
+/// Inertia of what flows: rho (dv/dt + v . grad v), dv/dt = rate v - history (see InertiaElement).
+struct FlowInertia {
+  std::vector<Real> density;  ///< [element], kg/m^3
+  Real rate = 0;              ///< 1/s; 0: a steady flow
+  std::vector<Real> history;  ///< [local node][dim], m/s^2; empty: none
+};
+
 /// Sizes against which residuals are judged; reduced over the ranks.
 struct ResidualReport {
   Real norm = 0;        ///< of the scaled residual, borders included
@@ -62,6 +71,7 @@ struct ResidualReport {
 /// What a matrix is the derivative of. `newton` is consistent, and then B of the lower left block also has how the
 /// subscales follow the viscosity; `symmetric` leaves that out, for methods that rely on symmetry: Newton's method then
 /// converges linearly in the end, by about 1/27 a step.
+/// Of inertia, `newton` and `symmetric` have the whole derivative and `picard` that with the carrying velocity kept.
 enum class Tangent { picard, symmetric, newton };
 
 /// The node with the largest residual of force.
@@ -88,6 +98,9 @@ class StokesOperator {
   void set_constraints(NodeConstraints constraints) { constraints_ = std::move(constraints); }
   const NodeConstraints& constraints() const noexcept { return constraints_; }
   void set_loads(StokesLoads loads) { loads_ = std::move(loads); }
+  /// The Navier-Stokes equations in place of the Stokes equations: no potential, and no symmetric tangent.
+  void set_inertia(FlowInertia inertia) { inertia_ = std::move(inertia); }
+  bool has_inertia() const noexcept { return inertia_.has_value(); }
   void set_gates(std::vector<FluxGate> gates) { gates_ = std::move(gates); }
   void set_terms(std::vector<ResidualTerm*> terms) { terms_ = std::move(terms); }
   /// Whether elements all of whose nodes are held at rest leave the equations, as if they had no viscosity: nothing
@@ -181,6 +194,8 @@ class StokesOperator {
   template <class Element>
   ElementLoad<Element::dim> element_load(LocalId element) const;
   template <int D>
+  InertiaElement<D> inertia_of(LocalId element, const ElementUnknowns<D>& unknowns) const;
+  template <int D>
   void add_tractions(Balance& sums) const;
   template <class Element>
   void add_void_pressure(Balance& sums) const;
@@ -197,6 +212,8 @@ class StokesOperator {
   NodeConstraints constraints_;
   NodeConstraints extended_constraints_;
   StokesLoads loads_;
+  std::optional<FlowInertia> inertia_;
+  std::vector<Real> inertia_rate_;  ///< [element] density times rate, kg/(m^3 s)
   std::vector<FluxGate> gates_;
   std::vector<ResidualTerm*> terms_;
   bool pressure_is_free_ = false;

@@ -28,7 +28,7 @@ class Builder {
   bool find_mobility() {
     Real held = 0;
     for (LocalId node = 0; node < mesh_.owned_nodes(); ++node) held += is_held(node) ? 1 : 0;
-    if (system_.comm->sum(held) == 0) return false;
+    if (system_.comm->sum(held) == 0 && system_.element_inertia.empty()) return false;
     std::vector<Real> values(index(blocks_.graph.entries()), 0.0);
     std::vector<Real> load(index(mesh_.nodes()), 0.0);
     assemble_speed(values, load);
@@ -100,7 +100,11 @@ class Builder {
       const Real weight = volume * system_.element_viscosity[index(element)];
       for (std::size_t a = 0; a < nodes.size(); ++a) {
         if (is_held(nodes[a])) continue;
-        load[index(nodes[a])] += volume / static_cast<Real>(nodes.size());
+        const Real share = volume / static_cast<Real>(nodes.size());
+        if (!system_.element_inertia.empty()) {
+          assembler.add(nodes[a], nodes[a], share * system_.element_inertia[index(element)]);
+        }
+        load[index(nodes[a])] += share;
         for (std::size_t b = 0; b < nodes.size(); ++b) {
           if (is_held(nodes[b])) continue;
           const Real product =

@@ -17,15 +17,16 @@ namespace malleus {
 /// (1988) for unsteady flow, the inverses of both limits are added. psi is the speed under a unit force, the solution
 /// of
 ///
-///     -div(eta grad psi) = 1,   psi = 0 at nodes held in all directions,
+///     rho/dt psi - div(eta grad psi) = 1,   psi = 0 at nodes held in all directions,
 ///
-/// which knows gaps and viscosities wherever they change. Where the pressure pushes on an opening (vents, gates), and
-/// where a border's pressure q stands against it, it meets the resistance of the flow's development over about H: an
-/// exchange of 0.7 sqrt(psi/eta) (p - q) per area, q = 0 outside. The borders are then eliminated exactly.
+/// which knows gaps and viscosities wherever they change, and what inertia resists in a step of time, as they meant it.
+/// Where the pressure pushes on an opening (vents, gates), and where a border's pressure q stands against it, it meets
+/// the resistance of the flow's development over about H: an exchange of 0.7 sqrt(psi/eta) (p - q) per area, q = 0
+/// outside. The borders are then eliminated exactly.
 class LubricationBlock {
  public:
-  /// Null where no node is held, or where the gaps are not small against the domain. The layout and the graph of
-  /// `blocks` must outlive the result, whose numbers are in the blocks' scaling. Collective.
+  /// Null where no node is held and nothing has inertia, or where the gaps are not small against the domain. The layout
+  /// and the graph of `blocks` must outlive the result, whose numbers are in the blocks' scaling. Collective.
   static std::unique_ptr<LubricationBlock> make_where_thin(const BorderedOperator& op, const StokesBlocks& blocks);
 
   /// Adds factor times the block's inverse on (residual_p, residual_q): corrections of owned nodes, and of the borders.

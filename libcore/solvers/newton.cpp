@@ -20,6 +20,8 @@ constexpr int most_refinements = 4;
 constexpr Real gate_refinement = 1e-2;
 /// Of the linear tolerance, that the flow of a gate may be off, relative to what was asked.
 constexpr Real gate_share = 0.3;
+/// With inertia: the relative residual below which Newton's steps lead to the solution; Picard's do from anywhere.
+constexpr Real near_with_inertia = 0.2;
 /// A share of a step is taken where the potential's slope has fallen to this share of that at the start.
 constexpr Real steepest_share = 0.5;
 
@@ -45,6 +47,8 @@ class Loop {
   void evaluate();
   bool compute_step(bool newton, Real tolerance);
   bool search(bool newton);
+  bool search_on_norm(bool newton);
+  bool may_use_newton() const;
   Real power_at(const StokesState& start, Real share);
   Real cut_share(const StokesState& start, Real slope);
   Real forcing(Real previous_norm);
@@ -211,6 +215,7 @@ Real Loop::cut_share(const StokesState& start, Real slope) {
 /// along the step is power_at(): Newton's direction descends in it, whatever the norm of the residual does. False, with
 /// the state as before, where it does not (a linear solve that was too loose).
 bool Loop::search(bool newton) {
+  if (op_.has_inertia()) return search_on_norm(newton);
   const StokesState start = state_;
   Real share = 1;
   if (newton) {
@@ -227,6 +232,31 @@ bool Loop::search(bool newton) {
   outcome_.history.back().step = share;
   outcome_.history.back().residual = report_.relative();
   return true;
+}
+
+/// With inertia there is no potential: a Newton step is halved until the residual's norm has fallen. False, with the
+/// state as before, where it does not.
+bool Loop::search_on_norm(bool newton) {
+  const StokesState start = state_;
+  const Real before = report_.norm;
+  Real share = 1;
+  for (int cut = 0; cut <= options_.max_cuts; ++cut, share /= 2) {
+    state_ = start;
+    op_.add_step(step_, share, share, state_);
+    evaluate();
+    if (newton && !(report_.norm < before)) continue;
+    outcome_.history.back().step = share;
+    outcome_.history.back().residual = report_.relative();
+    return true;
+  }
+  state_ = start;
+  evaluate();
+  return false;
+}
+
+bool Loop::may_use_newton() const {
+  if (options_.picard_alone) return false;
+  return !op_.has_inertia() || report_.relative() < near_with_inertia;
 }
 
 void Loop::solve_nonlinear_problem() {
@@ -246,7 +276,7 @@ void Loop::solve_nonlinear_problem() {
       return;
     }
     choose_branches(iteration, cold);
-    const bool newton = !first && picard_left <= 0 && !options_.picard_alone;
+    const bool newton = !first && picard_left <= 0 && may_use_newton();
     if (!first && !newton) --picard_left;
     const Real tolerance = newton ? forcing(previous_norm) : loosest();
     previous_norm = newton ? sound_norm() : 0;
