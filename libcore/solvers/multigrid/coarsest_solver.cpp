@@ -25,8 +25,20 @@ Eigen::MatrixXd to_dense(const MultigridLevel& level) {
   return dense;
 }
 
-/// Inverse of a symmetric positive semi-definite matrix, scaled to a unit diagonal first. Unknowns without stiffness
-/// get none; where the Cholesky factor fails, directions below 1e-12 of the stiffest are left out.
+/// Of a matrix with a unit diagonal that convection makes unsymmetric; directions of no stiffness are left out.
+Eigen::MatrixXd unsymmetric_inverse(const Eigen::MatrixXd& scaled) {
+  const Eigen::PartialPivLU<Eigen::MatrixXd> factor(scaled);
+  if (factor.rcond() > 1e-13) return factor.inverse();
+  return scaled.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+bool is_symmetric(const Eigen::MatrixXd& matrix) {
+  constexpr Real rounding = 1e-8;
+  return (matrix - matrix.transpose()).squaredNorm() <= rounding * rounding * matrix.squaredNorm();
+}
+
+/// Inverse of a positive semi-definite matrix, scaled to a unit diagonal first. Unknowns without stiffness get none;
+/// where the Cholesky factor fails, directions below 1e-12 of the stiffest are left out.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix, const std::vector<Real>& diagonal_inverses, int block) {
   const Eigen::Index size = matrix.rows();
   Eigen::VectorXd scale(size);
@@ -42,6 +54,7 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix, const std::vector<Real
     const Eigen::MatrixXd idle = Eigen::MatrixXd::Identity(block, block) - part * inverse;
     scaled.block(node * block, node * block, block, block) += 0.5 * (idle + idle.transpose());
   }
+  if (!is_symmetric(scaled)) return scale.asDiagonal() * unsymmetric_inverse(scaled) * scale.asDiagonal();
   const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
   const bool is_sound = factor.info() == Eigen::Success && factor.rcond() > 1e-13;
   if (is_sound) {
