@@ -222,4 +222,5 @@ def wait_for_writing(process, output, seconds=60):
                 return True
         except OSError:
             pass
+        time.sleep(0.0005)
     return False
