@@ -22,3 +22,17 @@ target_include_directories(malleus_dependencies SYSTEM INTERFACE
 target_link_libraries(malleus_dependencies INTERFACE
   MPI::MPI_CXX Eigen3::Eigen CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json ZLIB::ZLIB
   PkgConfig::PETSC PkgConfig::MUPARSER ${HDF5_C_LIBRARIES})
+
+# PT-Scotch (libptscotch-dev) is optional: without it [partition] method = scotch is refused.
+find_path(PTSCOTCH_INCLUDE ptscotch.h PATH_SUFFIXES scotch)
+find_library(PTSCOTCH_LIBRARY ptscotch)
+find_library(SCOTCH_LIBRARY scotch)
+find_library(PTSCOTCH_ERROR_LIBRARY ptscotcherr)
+if(PTSCOTCH_INCLUDE AND PTSCOTCH_LIBRARY AND SCOTCH_LIBRARY AND PTSCOTCH_ERROR_LIBRARY)
+  set(MALLEUS_PTSCOTCH_FOUND TRUE)
+  add_library(ptscotch INTERFACE)
+  target_include_directories(ptscotch SYSTEM INTERFACE ${PTSCOTCH_INCLUDE})
+  target_link_libraries(ptscotch INTERFACE ${PTSCOTCH_LIBRARY} ${SCOTCH_LIBRARY} ${PTSCOTCH_ERROR_LIBRARY})
+else()
+  message(STATUS "PT-Scotch was not found (libptscotch-dev): built without it")
+endif()

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.hpp"
+#include "forge/contact_couplings.hpp"
 #include "forge/forge_budget.hpp"
 #include "mesh/simplex.hpp"
 
@@ -101,7 +102,7 @@ RebalancedScene ForgeProcess::rebalanced_scene() {
     scene_->boundaries->mesh_changed();
     flow_.mesh_changed();
   };
-  return {scene_->comm, &scene_->mesh, &scene_->fields, mesh_moved};
+  return {scene_->comm, &scene_->mesh, &scene_->fields, mesh_moved, [this] { return contact_couplings(*scene_); }};
 }
 
 RemeshedScene ForgeProcess::remeshed_scene() {
@@ -110,7 +111,7 @@ RemeshedScene ForgeProcess::remeshed_scene() {
   lent.mesh = &scene_->mesh;
   lent.fields = &scene_->fields;
   lent.flow_field = field_name::velocity;
-  lent.balances_by_cost = case_.common.partition.method == PartitionMethod::cost;
+  lent.balances_by_cost = case_.common.partition.method != PartitionMethod::curve;
   lent.keep_volume = true;
   for (const Body& body : scene_->bodies) {
     const auto settings = std::find_if(case_.bodies.begin(), case_.bodies.end(),

@@ -51,7 +51,7 @@ FillingProcess::FillingProcess(const Communicator& comm, Mesh mesh, const Inject
 void FillingProcess::add_remeshing() {
   const CommonSections& common = scene_.settings.common;
   if (Rebalancing::is_wanted(common.partition, scene_.comm)) {
-    const RebalancedScene shared = {&scene_.comm, &scene_.mesh, &scene_.fields, [this] { rebuild(); }};
+    const RebalancedScene shared = {&scene_.comm, &scene_.mesh, &scene_.fields, [this] { rebuild(); }, {}};
     rebalancing_ = std::make_unique<Rebalancing>(common.partition, shared);
     order_.insert(order_.begin(), rebalancing_.get());
   }
@@ -62,7 +62,7 @@ void FillingProcess::add_remeshing() {
   lent.mesh = &scene_.mesh;
   lent.fields = &scene_.fields;
   lent.flow_field = "velocity";
-  lent.balances_by_cost = common.partition.method == PartitionMethod::cost;
+  lent.balances_by_cost = common.partition.method != PartitionMethod::curve;
   lent.keep_volume = true;
   if (front_) {
     lent.before = [this] { front_->prepare_remesh(); };

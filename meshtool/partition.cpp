@@ -33,6 +33,7 @@ struct PartitionCommand {
   std::string parts_file;
   std::string report;
   std::string method = "refined";
+  std::string start = "best";
   std::string release;
   PartitionOptions options;
   Real length_unit = 1;
@@ -68,6 +69,10 @@ void add_options(CLI::App& app, PartitionCommand& c) {
   app.add_option("--method", c.method,
                  "refined (default), curve, strips (the paper's algorithm), or keep: the partition of --from as it is")
       ->check(CLI::IsMember({"refined", "curve", "strips", "keep"}));
+  app.add_option("--start", c.start,
+                 "What a new partition is refined from: best (default: of the next three that of least cut), curve, "
+                 "coordinate, inertial, or scotch (PT-Scotch)")
+      ->check(CLI::IsMember({"best", "curve", "coordinate", "inertial", "scotch"}));
   app.add_option("--release", c.release,
                  "With --from: moves the borders between the parts inside them, as a remesher wants; balanced, or "
                  "shifted by a layer whatever the loads")
@@ -252,6 +257,12 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
                                                       {"strips", Partitioner::strips},
                                                       {"keep", Partitioner::keep}};
   command.options.method = methods.at(command.method);
+  const std::map<std::string, PartitionStart> starts = {{"best", PartitionStart::best},
+                                                        {"curve", PartitionStart::curve},
+                                                        {"coordinate", PartitionStart::coordinate},
+                                                        {"inertial", PartitionStart::inertial},
+                                                        {"scotch", PartitionStart::scotch}};
+  command.options.start = starts.at(command.start);
   if (command.method == "keep" && command.from.empty()) throw InputError("command line: --method keep wants --from");
   const Architecture architecture = command.architecture.empty()
                                         ? equal_architecture(command.parts)

@@ -159,7 +159,7 @@ void LimitSettings::describe(Section& s) {
 void PartitionSettings::describe(Section& s) {
   s.choice("method", method,
            {{"curve", PartitionMethod::curve}, {"scotch", PartitionMethod::scotch}, {"cost", PartitionMethod::cost}},
-           "stretches of a space-filling curve, or least computing plus communication time (scotch is not built in)");
+           "stretches of a space-filling curve, least computing plus communication time, or the same from a start by PT-Scotch");
   s.choice("balance", balance, {{"counted", Balance::counted}, {"measured", Balance::measured}},
            "work of elements and nodes counted, or shares by speeds measured in each increment (then the bytes of two "
            "runs differ)");

@@ -14,14 +14,21 @@
 namespace malleus {
 namespace {
 
-constexpr Real least_gain = 0.02;      ///< of F, below which nothing is moved
-constexpr Real equal_speeds = 0.05;    ///< differences below it are noise
-constexpr int patience = 2;            ///< increments in a row in which speeds must differ from those in force
-constexpr Real damping = 0.5;          ///< of new measurements
-constexpr std::size_t told_after = 3;  ///< increments, whose mean wall time is compared
+constexpr Real least_counted_gain = 0.005;  ///< of F, below which nothing is moved
+constexpr Real least_measured_gain = 0.02;  ///< likewise; speeds are noisy
+constexpr Real equal_speeds = 0.05;         ///< differences below it are noise
+constexpr int patience = 2;                 ///< increments in a row in which speeds must differ from those in force
+constexpr Real damping = 0.5;               ///< of new measurements
+constexpr std::size_t told_after = 3;       ///< increments, whose mean wall time is compared
 
 Real mean(const std::vector<Real>& values) {
   return std::accumulate(values.begin(), values.end(), Real{0}) / static_cast<Real>(values.size());
+}
+
+std::string pairs_across(const PartitionPlan& plan) {
+  if (plan.before.cut_couplings + plan.after.cut_couplings == 0) return "";
+  return fmt::format("; {} contact couplings between ranks instead of {}", plan.after.cut_couplings,
+                     plan.before.cut_couplings);
 }
 
 }  // namespace
@@ -94,8 +101,13 @@ void Rebalancing::repartition(const Increment& increment) {
   increments_apart_ = 0;
   elements_seen_ = scene_.mesh->total_elements;
   const std::vector<int> here(static_cast<std::size_t>(scene_.mesh->elements()), scene_.comm->rank());
-  const PartitionPlan plan = make_partition(*scene_.comm, *scene_.mesh, solver_work(), machine, {}, here);
-  if (plan.after.cost > plan.before.cost * (1 - least_gain)) return;
+  WorkModel model = solver_work();
+  if (scene_.couplings) model.couplings = scene_.couplings();
+  const PartitionOptions options;
+  const PartitionPlan plan = make_partition(*scene_.comm, *scene_.mesh, model, machine, options, here);
+  const Real least_gain = is_measured() ? least_measured_gain : least_counted_gain;
+  const Real gain = plan.before.cost - plan.after.cost;
+  if (gain < least_gain * plan.before.cost || gain < options.moving_cost * plan.moved) return;
   migrate(*scene_.comm, *scene_.mesh, *scene_.fields, plan.parts);
   scene_.mesh_moved();
   ++times_;
@@ -104,8 +116,9 @@ void Rebalancing::repartition(const Increment& increment) {
   increments_s_.clear();
   log::info(
       "balance: in increment {} an increment is expected to take {:.3f} of the ideal instead of {:.3f}, {:.0f} % less; "
-      "{:.1f} % of the work moved by {}{}",
+      "{:.1f} % of the work moved by {}{}{}",
       increment.number, plan.after.cost, plan.before.cost, 100 * expected_gain_, 100 * plan.moved, plan.made_by,
+      pairs_across(plan),
       is_measured() ? fmt::format("; measured speeds {:.2f} to {:.2f} of the mean (not repeatable)",
                                   *std::min_element(speeds_.begin(), speeds_.end()),
                                   *std::max_element(speeds_.begin(), speeds_.end()))

@@ -20,6 +20,8 @@ struct RebalancedScene {
   FieldStore* fields = nullptr;
   /// Elements have moved between ranks, fields with them: what is built on the mesh is to be built anew. Collective.
   std::function<void()> mesh_moved;
+  /// What exchanges data beside the mesh, contact pairs for one; may be empty. Collective.
+  std::function<std::vector<NodeCoupling>()> couplings;
 };
 
 /// Elements per second of this rank's processor as it is now: the best of a few passes over its elements' geometry. 0
@@ -28,13 +30,14 @@ Real measure_element_rate(const Mesh& mesh);
 
 /// Stands before the solves, behind a remesh. `counted` looks at the shares in a run's first increment and where the
 /// mesh is another one, by the work that elements and nodes cost; `measured` in each increment, by the speeds at which
-/// the processors go over their elements (then the bytes of two runs differ). Elements move only where F falls by
-/// more than 2 % (partition_cost()). The log says what is expected, and after three increments what came of it.
+/// the processors go over their elements (then the bytes of two runs differ). Elements move only where F
+/// (partition_cost()) falls by more than 0.5 %, by measured speeds 2 %, and by more than moving them costs. The log
+/// says what is expected, and after three increments what came of it.
 class Rebalancing final : public Component {
  public:
   /// Whether a run wants it: shares along the curve that are counted stay as they are.
   static bool is_wanted(const PartitionSettings& settings, const Communicator& comm) {
-    return comm.size() > 1 && (settings.method == PartitionMethod::cost || settings.balance == Balance::measured);
+    return comm.size() > 1 && (settings.method != PartitionMethod::curve || settings.balance == Balance::measured);
   }
 
   Rebalancing(const PartitionSettings& settings, RebalancedScene scene);

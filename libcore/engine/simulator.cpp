@@ -17,6 +17,7 @@
 #include "engine/stop_request.hpp"
 #include "engine/targets.hpp"
 #include "partition/balance.hpp"
+#include "partition/scotch_start.hpp"
 #include "remesh/distributed.hpp"
 
 namespace malleus {
@@ -103,8 +104,9 @@ void check_probe_fields(Process& process, const CommonSections& common, CaseRead
 
 /// What of [partition] is not there.
 void check_partition(const CommonSections& common, CaseReader& reader) {
-  if (common.partition.method == PartitionMethod::scotch) {
-    reader.fail("partition", "method", "scotch is not built in; cost and curve are");
+  if (common.partition.method == PartitionMethod::scotch && !has_scotch()) {
+    reader.fail("partition", "method",
+                "scotch is not built in; cost and curve are (for PT-Scotch install libptscotch-dev and build again)");
   }
 }
 
@@ -214,8 +216,10 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   } catch (const InputError& error) {
     throw InputError(reader.located(error.what()));
   }
-  if (common.partition.method == PartitionMethod::cost && comm.size() > 1) {
-    log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, solver_work(), true)));
+  if (common.partition.method != PartitionMethod::curve && comm.size() > 1) {
+    const PartitionStart start =
+        common.partition.method == PartitionMethod::scotch ? PartitionStart::scotch : PartitionStart::best;
+    log::say(describe_balance(balance_by_cost(comm, mesh, file_fields, solver_work(), true, start)));
   }
   try {
     return run_scene(comm, simulator, std::move(mesh), std::move(settings), reader);

@@ -60,11 +60,12 @@ MigrationReport balance_along_curve(const Communicator& comm, Mesh& mesh, FieldS
 }
 
 BalanceReport balance_by_cost(const Communicator& comm, Mesh& mesh, FieldStore& fields, const WorkModel& model,
-                              bool anew) {
+                              bool anew, PartitionStart start) {
   const std::vector<int> here(static_cast<std::size_t>(mesh.elements()), comm.rank());
   const Architecture ranks = equal_architecture(comm.size());
   PartitionOptions options;
   options.starts_anew = anew;
+  options.start = start;
   const PartitionPlan plan = make_partition(comm, mesh, model, ranks, options, here);
   BalanceReport report = {plan.before.cost, plan.after.cost, plan.moved, plan.made_by, {}};
   report.migration = migrate(comm, mesh, fields, plan.parts);

@@ -26,9 +26,9 @@ struct BalanceReport {
 };
 
 /// Divides the elements among the ranks by make_partition() for equal processors and moves them, fields with them,
-/// where that lowers the cost. anew: from the best start instead of from where they are, as after reading. Collective.
+/// where that lowers the cost. anew: from `start` instead of from where they are, as after reading. Collective.
 BalanceReport balance_by_cost(const Communicator& comm, Mesh& mesh, FieldStore& fields, const WorkModel& model,
-                              bool anew);
+                              bool anew, PartitionStart start = PartitionStart::best);
 
 /// "shares by ...: an increment is expected to take 1.02 of the ideal instead of 1.05; 4 % of the work moved".
 std::string describe_balance(const BalanceReport& report);

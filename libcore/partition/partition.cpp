@@ -13,6 +13,7 @@
 #include "partition/bisect.hpp"
 #include "partition/multilevel.hpp"
 #include "partition/relabel.hpp"
+#include "partition/scotch_start.hpp"
 #include "partition/strip_migration.hpp"
 
 namespace malleus {
@@ -69,7 +70,7 @@ class Planner {
         model_(model),
         architecture_(architecture),
         options_(options),
-        graph_(build_work_graph(comm, mesh, element_work(comm, mesh, model))) {
+        graph_(build_work_graph(comm, mesh, element_work(comm, mesh, model), model.couplings)) {
     const Real total = comm.sum(std::accumulate(graph_.weights.begin(), graph_.weights.end(), Real{0}));
     for (const Real speed : architecture.speed) targets_.push_back(total * speed / architecture.total_speed());
     clock_.end("graph");
@@ -162,14 +163,30 @@ class Planner {
     return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, settings);
   }
 
-  /// The start of least cut, refined.
+  Candidate make_start(PartitionStart start) const {
+    switch (start) {
+      case PartitionStart::coordinate:
+        return {bisect(comm_, graph_, architecture_.speed, BisectionAxis::coordinate), "coordinate bisection", {}, 0};
+      case PartitionStart::inertial:
+        return {bisect(comm_, graph_, architecture_.speed, BisectionAxis::inertial), "inertial bisection", {}, 0};
+      case PartitionStart::scotch:
+        if (architecture_.parts() > graph_.ownership.total()) break;  // its parts are never empty
+        return {scotch_parts(comm_, graph_, architecture_.speed), "PT-Scotch", {}, 0};
+      default:
+        break;
+    }
+    return {curve_parts(), "curve", {}, 0};
+  }
+
+  /// The chosen start, or that of least cut, refined.
   Candidate anew() {
     std::vector<Candidate> starts;
-    starts.push_back({curve_parts(), "curve", {}, 0});
-    starts.push_back(
-        {bisect(comm_, graph_, architecture_.speed, BisectionAxis::coordinate), "coordinate bisection", {}, 0});
-    starts.push_back(
-        {bisect(comm_, graph_, architecture_.speed, BisectionAxis::inertial), "inertial bisection", {}, 0});
+    if (options_.start == PartitionStart::best) {
+      for (const auto start : {PartitionStart::curve, PartitionStart::coordinate, PartitionStart::inertial})
+        starts.push_back(make_start(start));
+    } else {
+      starts.push_back(make_start(options_.start));
+    }
     std::size_t best = 0;
     Real least = 0;
     for (std::size_t i = 0; i < starts.size(); ++i) {

@@ -18,9 +18,19 @@ enum class Partitioner {
   keep,     ///< the given partition as it is, for its measures
 };
 
+/// What a new partition is refined from.
+enum class PartitionStart {
+  best,        ///< the curve, coordinate or inertial bisection, whichever cuts least
+  curve,       ///< stretches of the space-filling curve
+  coordinate,  ///< recursive coordinate bisection
+  inertial,    ///< recursive inertial bisection
+  scotch,      ///< PT-Scotch (scotch_start.hpp)
+};
+
 struct PartitionOptions {
   Partitioner method = Partitioner::refined;
-  Real tolerance = 0.01;     ///< imbalance of the work aimed at
+  Real tolerance = 0.01;  ///< imbalance of the work aimed at
+  PartitionStart start = PartitionStart::best;
   bool starts_anew = false;  ///< a given partition is compared with a new one, not repaired
   /// Cost of moving everything once, in increments, over the increments until the next repair: by it a plan that moves
   /// less is preferred to one that costs less per increment.

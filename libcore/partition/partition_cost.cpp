@@ -62,13 +62,14 @@ class CostCounter {
 
   /// Sums over the ranks the communication time of each part. Collective.
   std::vector<Real> communication(const WorkGraph& graph, std::span<const int> parts,
-                                  std::span<const CutEdge> cut_edges, PartitionCost& cost) {
+                                  std::span<const CutEdge> cut_edges, std::span<const CutCoupling> couplings,
+                                  PartitionCost& cost) {
     GlobalId cut = 0;
     for (LocalId v = 0; v < graph.owned(); ++v) {
       const int part = parts[static_cast<std::size_t>(v)];
       for (std::size_t j = graph.first(v); j < graph.last(v); ++j) {
         const int other = parts[static_cast<std::size_t>(graph.neighbours[j])];
-        if (other == part) continue;
+        if (other == part || graph.faces[j] < 0) continue;
         cut += graph.edge_weights[j];
         add(part, other, graph.edge_weights[j]);
       }
@@ -77,7 +78,12 @@ class CostCounter {
       add(static_cast<int>(edge.low_part), static_cast<int>(edge.high_part), 1);
       add(static_cast<int>(edge.high_part), static_cast<int>(edge.low_part), 1);
     }
+    for (const CutCoupling& coupling : couplings) {
+      add(coupling.part, coupling.other, coupling.weight);
+      add(coupling.other, coupling.part, coupling.weight);
+    }
     cost.cut = comm_.sum(cut) / 2;
+    cost.cut_couplings = comm_.sum(static_cast<GlobalId>(couplings.size()));
     cost.cut_edges = comm_.sum(static_cast<GlobalId>(cut_edges.size()));
     comm_.sum_in_place(std::span<Real>(time_));
     return time_;
@@ -174,7 +180,8 @@ PartitionCost partition_cost(const Communicator& comm, const Mesh& mesh, const W
   const std::vector<int> part_of_node = assign_nodes(comm, mesh, split, model, architecture, own_parts);
   CostCounter counter(comm, model, architecture);
   const std::vector<Real> communication =
-      counter.communication(graph, all_parts, unique_cut_edges(comm, mesh, part_of_node), cost);
+      counter.communication(graph, all_parts, unique_cut_edges(comm, mesh, part_of_node),
+                            cut_couplings(comm, mesh, model.couplings, part_of_node), cost);
 
   const std::vector<Real> elements = count_per_part(comm, own_parts, n_parts);
   const std::vector<Real> nodes =

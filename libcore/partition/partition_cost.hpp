@@ -18,6 +18,7 @@ struct PartitionCost {
   Real node_imbalance = 0;            ///< the same of owned nodes
   GlobalId cut = 0;                   ///< faces between elements of different parts
   GlobalId cut_edges = 0;             ///< mesh edges between nodes of different parts
+  GlobalId cut_couplings = 0;         ///< of the model, likewise
   GlobalId communication_volume = 0;  ///< sum over nodes of the parts around it, minus 1
   GlobalId largest_volume = 0;        ///< of one part
   GlobalId interface_nodes = 0;       ///< nodes of more than one part

@@ -94,6 +94,29 @@ void set_weights(const Communicator& comm, std::span<const Real> work, WorkGraph
   }
 }
 
+void list_edges(std::span<const GlobalId> across, std::span<const ElementCoupling> coupled, WorkGraph& graph) {
+  const auto sides = static_cast<std::size_t>(graph.dim) + 1;
+  const auto owned = static_cast<LocalId>(across.size() / sides);
+  const auto add = [&](GlobalId element, signed char face, std::int32_t weight) {
+    const auto copy = std::lower_bound(graph.copy_numbers.begin(), graph.copy_numbers.end(), element);
+    graph.faces.push_back(face);
+    graph.edge_weights.push_back(weight);
+    graph.neighbours.push_back(graph.ownership.owns(element)
+                                   ? static_cast<LocalId>(element - graph.ownership.begin())
+                                   : owned + static_cast<LocalId>(copy - graph.copy_numbers.begin()));
+  };
+  graph.start.assign(1, 0);
+  auto coupling = coupled.begin();
+  for (LocalId e = 0; e < owned; ++e) {
+    for (std::size_t face = 0; face < sides; ++face) {
+      const GlobalId element = across[static_cast<std::size_t>(e) * sides + face];
+      if (element >= 0) add(element, static_cast<signed char>(face), 1);
+    }
+    for (; coupling != coupled.end() && coupling->element == e; ++coupling) add(coupling->other, -1, coupling->weight);
+    graph.start.push_back(static_cast<std::int64_t>(graph.neighbours.size()));
+  }
+}
+
 void set_centres(const Mesh& mesh, WorkGraph& graph) {
   graph.centres.assign(static_cast<std::size_t>(mesh.elements()) * static_cast<std::size_t>(mesh.dim), 0);
   for (LocalId e = 0; e < mesh.elements(); ++e) {
@@ -148,32 +171,25 @@ std::vector<GlobalId> face_neighbours(const Communicator& comm, const Mesh& mesh
   return across;
 }
 
-WorkGraph build_work_graph(const Communicator& comm, const Mesh& mesh, std::span<const Real> work) {
+WorkGraph build_work_graph(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                           const std::vector<NodeCoupling>& couplings) {
   check(work.size() == static_cast<std::size_t>(mesh.elements()), "one work an element");
   WorkGraph graph;
   graph.dim = mesh.dim;
   graph.ownership = Ownership(comm, mesh.elements());
   const std::vector<GlobalId> across = face_neighbours(comm, mesh, graph.ownership);
+  const std::vector<ElementCoupling> coupled = couple_elements(comm, mesh, graph.ownership, couplings);
   for (const GlobalId element : across) {
     if (element >= 0 && !graph.ownership.owns(element)) graph.copy_numbers.push_back(element);
+  }
+  for (const ElementCoupling& coupling : coupled) {
+    if (!graph.ownership.owns(coupling.other)) graph.copy_numbers.push_back(coupling.other);
   }
   std::sort(graph.copy_numbers.begin(), graph.copy_numbers.end());
   graph.copy_numbers.erase(std::unique(graph.copy_numbers.begin(), graph.copy_numbers.end()), graph.copy_numbers.end());
   graph.halo = Halo(comm, graph.ownership, graph.copy_numbers);
 
-  const auto sides = static_cast<std::size_t>(mesh.dim) + 1;
-  graph.start.assign(1, 0);
-  for (std::size_t slot = 0; slot < across.size(); ++slot) {
-    if (const GlobalId element = across[slot]; element >= 0) {
-      graph.faces.push_back(static_cast<signed char>(slot % sides));
-      const auto copy = std::lower_bound(graph.copy_numbers.begin(), graph.copy_numbers.end(), element);
-      graph.neighbours.push_back(graph.ownership.owns(element)
-                                     ? static_cast<LocalId>(element - graph.ownership.begin())
-                                     : mesh.elements() + static_cast<LocalId>(copy - graph.copy_numbers.begin()));
-    }
-    if (slot % sides == sides - 1) graph.start.push_back(static_cast<std::int64_t>(graph.neighbours.size()));
-  }
-  graph.edge_weights.assign(graph.neighbours.size(), 1);
+  list_edges(across, coupled, graph);
   set_weights(comm, work, graph);
   set_centres(mesh, graph);
   return graph;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mesh/mesh.hpp"
+#include "partition/couplings.hpp"
 
 namespace malleus {
 
@@ -17,6 +18,7 @@ struct WorkModel {
   Real node = 100;           ///< solving for a node, >= 0
   Real communication = 1;    ///< per cut edge of either graph, at bandwidth 1, >= 0
   std::vector<Real> factor;  ///< [element] relative work of each, >= 0; empty = 1. Scaled so that the total stays.
+  std::vector<NodeCoupling> couplings;  ///< beside the mesh, each on one rank
 };
 
 /// The work of this program's own solver, for sharing out its runs (mesh/node_owners.hpp). WorkModel's defaults are the
@@ -35,7 +37,7 @@ struct WorkGraph {
   std::vector<std::int64_t> start;         ///< [owned + 1]
   std::vector<LocalId> neighbours;         ///< vertices, copies among them
   std::vector<std::int32_t> edge_weights;  ///< [edge] common faces
-  std::vector<signed char> faces;          ///< [edge] which face of the element it is; only where vertices are elements
+  std::vector<signed char> faces;          ///< [edge] of the element, -1 a coupling; only where vertices are elements
   std::vector<Real> weights;               ///< [owned] work in whole multiples of a unit, so that sums are exact
   std::vector<Real> centres;               ///< [owned][dim], m
   Real unit = 1;                           ///< work that a weight of 1 stands for
@@ -57,7 +59,8 @@ std::vector<Real> element_work(const Communicator& comm, const Mesh& mesh, const
 /// boundary. elements: the layout. Collective.
 std::vector<GlobalId> face_neighbours(const Communicator& comm, const Mesh& mesh, const Ownership& elements);
 
-/// work: of each element, as element_work() gives it. Collective.
-WorkGraph build_work_graph(const Communicator& comm, const Mesh& mesh, std::span<const Real> work);
+/// work: of each element, as element_work() gives it. Couplings become edges beside the faces. Collective.
+WorkGraph build_work_graph(const Communicator& comm, const Mesh& mesh, std::span<const Real> work,
+                           const std::vector<NodeCoupling>& couplings = {});
 
 }  // namespace malleus

@@ -7,6 +7,7 @@
 #include "base/error.hpp"
 #include "partition/interface_release.hpp"
 #include "partition/node_parts.hpp"
+#include "partition/scotch_start.hpp"
 #include "support/box_mesh.hpp"
 #include "support/world.hpp"
 
@@ -77,6 +78,28 @@ TEST_P(Partitions, AvoidSlowLinks) {
   const WorkGraph graph = build_work_graph(world(), mesh, element_work(world(), mesh, model));
   const PartitionPlan aware = make_partition(world(), mesh, model, machine, {});
   EXPECT_LE(aware.after.cost, partition_cost(world(), mesh, graph, model, machine, blind.parts).cost + 1e-12);
+}
+
+TEST_P(Partitions, StartFromWhateverIsAskedFor) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 16 : 6);
+  PartitionOptions options;
+  for (const auto& [start, name] :
+       {std::pair(PartitionStart::curve, "curve"), std::pair(PartitionStart::coordinate, "coordinate bisection"),
+        std::pair(PartitionStart::inertial, "inertial bisection"), std::pair(PartitionStart::scotch, "PT-Scotch")}) {
+    options.start = start;
+    if (start == PartitionStart::scotch && !has_scotch()) {
+      EXPECT_THROW(make_partition(world(), mesh, {}, equal_architecture(4), options), InputError);
+      continue;
+    }
+    const PartitionPlan plan = make_partition(world(), mesh, {}, equal_architecture(4), options);
+    expect_parts(mesh, plan.parts, 4);
+    EXPECT_EQ(plan.made_by, std::string(name) + " and refinement");
+    EXPECT_LE(plan.after.imbalance, 0.03) << name;
+    EXPECT_EQ(plan.after.empty_parts, 0) << name;
+    EXPECT_EQ(plan.parts, make_partition(world(), mesh, {}, equal_architecture(4), options).parts) << name;
+  }
+  const Mesh tiny = box(GetParam(), 1);
+  expect_parts(tiny, make_partition(world(), tiny, {}, equal_architecture(50), options).parts, 50);
 }
 
 TEST_P(Partitions, AreTheSameTwice) {
