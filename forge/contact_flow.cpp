@@ -47,6 +47,7 @@ void ContactFlow::mesh_changed() {
   linear_.reset();
   memory_.clear();
   contact_.points().clear();
+  is_transferred_ = true;
 }
 
 void ContactFlow::save() {
@@ -299,6 +300,24 @@ Prediction ContactFlow::predict(const Stage& stage) const {
   return prediction;
 }
 
+/// [region] Pa, of the surface nodes under pressure.
+std::vector<Real> ContactFlow::mean_contact_pressure(const FreeSurface& surface) const {
+  const Field& pressure = std::as_const(scene_.fields)[field_name::contact_pressure];
+  std::vector<Real> sums(scene_.bodies.size() * 2, 0.0);
+  for (std::size_t place = 0; place < surface.nodes().size(); ++place) {
+    const LocalId node = surface.nodes()[place];
+    const Real here = *pressure.at(node);
+    if (!(here > 0)) continue;
+    const auto body = static_cast<std::size_t>(surface.body_of_node(node));
+    sums[2 * body] += surface.area(place) * here;
+    sums[2 * body + 1] += surface.area(place);
+  }
+  scene_.comm->sum_in_place(sums);
+  std::vector<Real> means;
+  for (std::size_t i = 0; i < sums.size(); i += 2) means.push_back(sums[i + 1] > 0 ? sums[i] / sums[i + 1] : 0);
+  return means;
+}
+
 void ContactFlow::find_points(const Stage& stage, const FreeSurface& surface) {
   const std::vector<Real> shear_stress = has_limited_friction() ? nodal_shear_stress() : std::vector<Real>();
   ContactScene contact_scene;
@@ -310,8 +329,11 @@ void ContactFlow::find_points(const Stage& stage, const FreeSurface& surface) {
   if (scene_.thermal) contact_scene.softening = scene_.thermal->node_softening;
   contact_scene.memory = memory_;
   contact_scene.settings = scene_.contact;
+  std::vector<Real> mean_pressure;
   if (scene_.fields.has(field_name::contact_pressure) && !scene_.comm->any(!memory_.empty())) {
     contact_scene.last_pressure = std::as_const(scene_.fields)[field_name::contact_pressure].values();
+    mean_pressure = mean_contact_pressure(surface);
+    contact_scene.mean_pressure = mean_pressure;
   }
   contact_.points() = find_contacts(*scene_.comm, contact_scene, predict(stage));
   std::vector<GlobalId> wanted;
@@ -423,12 +445,22 @@ Outcome ContactFlow::run_picard(Real tolerance) {
                        " times: " + picard.reason);
 }
 
+std::vector<Real> ContactFlow::shear_rates() const {
+  const auto strain_rate = std::as_const(scene_.fields)[field_name::strain_rate].values();
+  std::vector<Real> rates;
+  for (const Real rate : strain_rate) rates.push_back(std::sqrt(3.0) * rate);
+  return rates;
+}
+
 NewtonOutcome ContactFlow::run_newton_once(const NewtonOptions& asked) {
   NewtonOptions options = asked;
+  const std::vector<Real> earlier_rates = is_transferred_ && !is_cold_ ? shear_rates() : std::vector<Real>();
+  options.start_shear_rates = earlier_rates;
   if (is_cold_) options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
   const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
   report_.newton_iterations += outcome.iterations();
   is_cold_ = is_cold_ && !outcome.converged;
+  is_transferred_ = is_transferred_ && !outcome.converged;
   totals_.linear_solves += outcome.linear_solves;
   totals_.linear_iterations += outcome.linear_iterations;
   totals_.linear_failures += outcome.converged ? 0 : 1;

@@ -124,10 +124,12 @@ class ContactFlow final : public Component {
   Outcome solve_contacts(const Stage& stage, const FreeSurface& surface);
   Prediction predict(const Stage& stage) const;
   void find_points(const Stage& stage, const FreeSurface& surface);
+  std::vector<Real> mean_contact_pressure(const FreeSurface& surface) const;
   bool is_pushed(Real time) const;
   void rest();
   void prepare_operator(const Stage& stage);
   Outcome run_newton(Real tolerance);
+  std::vector<Real> shear_rates() const;  ///< [element] 1/s, of the strain_rate field
   NewtonOutcome run_newton_once(const NewtonOptions& asked);
   Outcome run_picard(Real tolerance);
   void volume_targets(const Displacement& displacement, StokesLoads& loads);
@@ -167,7 +169,8 @@ class ContactFlow final : public Component {
   std::vector<Touching> touching_;
   bool has_contacts_ = false;  ///< on any rank
   bool keeps_stress_ = true;
-  bool is_cold_ = true;  ///< no solution tells Newton's method where to start
+  bool is_transferred_ = false;  ///< the first guess comes from another mesh
+  bool is_cold_ = true;          ///< no solution tells Newton's method where to start
   GlobalId tried_increment_ = -1;
   int tries_ = 0;  ///< of that increment
   FlowReport report_;

@@ -10,8 +10,12 @@ namespace {
 constexpr Real same_face = 0.8;
 /// Nodes nearer than this share of an edge at the start touch.
 constexpr Real touching = 1e-6;
-/// Nodes under pressure whose memory was lost hold where they are expected nearer than this share of an edge.
-constexpr Real near = 0.1;
+/// Where the memory was lost: nodes expected within this share of an edge hold; those within the other one where they
+/// bear this share of their body's mean contact pressure. (Interpolation gives some pressure to new nodes just outside
+/// a contact: each that is taken to hold costs some iterations, as it sticks until the first solve has ended.)
+constexpr Real closed = 1e-3;
+constexpr Real near = 2e-2;
+constexpr Real borne_share = 0.2;
 /// Parts of a node's area that face its opponent less than this share count as this share.
 constexpr Real least_area = 1e-3;
 
@@ -29,11 +33,13 @@ const ContactMemory* recall(const ContactScene& scene, LocalId slave, int oppone
   return best;
 }
 
-/// Whether a node held, where only its pressure tells.
+/// Whether a node held, where only its place and its pressure tell.
 bool held_before(const ContactScene& scene, LocalId slave, Real gap) {
-  if (scene.last_pressure.empty() || !(scene.last_pressure[static_cast<std::size_t>(slave)] > 0)) return false;
-  const BodyScale& body = scene.bodies[static_cast<std::size_t>(scene.surface->body_of_node(slave))];
-  return gap <= near * body.edge;
+  if (scene.last_pressure.empty()) return false;
+  const auto body = static_cast<std::size_t>(scene.surface->body_of_node(slave));
+  const Real share = gap / scene.bodies[body].edge;
+  const Real pressure = scene.last_pressure[static_cast<std::size_t>(slave)];
+  return share <= closed || (share <= near && pressure > borne_share * scene.mean_pressure[body]);
 }
 
 /// Normal, gap and the velocity of the guess relative to the opponent, which the linearised gap starts from.

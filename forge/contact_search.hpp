@@ -60,9 +60,10 @@ struct ContactScene {
   std::span<const Real> shear_stress;     ///< [local node] of the last known state, Pa; may be empty: unlimited
   std::span<const Real> softening;        ///< [local node] of the consistency; empty: none softens
   std::span<const ContactMemory> memory;  ///< sorted by slave, opponent
-  /// [local node] Pa, where the memory was lost (a restart, another mesh): nodes under pressure that are near an
-  /// opponent are taken to hold. Empty: the memory is right.
+  /// [local node] Pa, where the memory was lost (a restart, another mesh): nodes that are near an opponent, most of
+  /// them under pressure, are taken to hold. Empty: the memory is right.
   std::span<const Real> last_pressure;
+  std::span<const Real> mean_pressure;  ///< [region] Pa, of the nodes under pressure, on all ranks; with last_pressure
   ContactSettings settings;
 };
 

@@ -25,7 +25,7 @@ void declare_fields(Scene& scene) {
   declare(field_name::velocity, "m/s", node, dim, interpolate);
   declare(field_name::pressure, "Pa", node, 1, interpolate);
   declare(field_name::viscosity, "Pa.s", element, 1, recompute);
-  declare(field_name::strain_rate, "1/s", element, 1, recompute);
+  declare(field_name::strain_rate, "1/s", element, 1, interpolate, true);
   declare(field_name::equivalent_strain, "1", element, 1, interpolate, true);
   declare(field_name::stress, "Pa", element, dim * (dim + 1) / 2, recompute);
   declare(field_name::quality, "1", element, 1, recompute);

@@ -147,7 +147,7 @@ CaseFile CaseFile::parse(std::string_view text, const std::filesystem::path& pat
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   file.open_ = nullptr;
-  for (const std::string& assignment : overrides) file.add_override(assignment);
+  for (const std::string& assignment : overrides) file.set(assignment, "command line");
   return file;
 }
 
@@ -236,8 +236,8 @@ std::string CaseFile::nearest_sibling(std::string_view kind, std::string_view na
   return nearest.empty() ? "" : fmt::format("; did you mean '{}.{}'?", kind, nearest);
 }
 
-void CaseFile::add_override(const std::string& assignment) {
-  const Place place = {"command line", 0};
+void CaseFile::set(const std::string& assignment, const std::string& origin) {
+  const Place place = {origin, 0};
   const std::size_t equals = assignment.find('=');
   const std::string_view target = trim(std::string_view(assignment).substr(0, equals));
   const std::size_t dot = target.rfind('.');

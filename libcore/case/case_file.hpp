@@ -11,7 +11,8 @@
 
 namespace malleus {
 
-/// Where something was written. Line 0: on the command line, or nowhere in particular; no file: the case as a whole.
+/// Where something was written. Line 0: not in a file (the command line, what targets led to), or nowhere in
+/// particular; no file: the case as a whole.
 struct Place {
   std::string file;  ///< as the user named it
   int line = 0;
@@ -72,6 +73,10 @@ class CaseFile {
 
   const std::filesystem::path& path() const { return path_; }
   const std::vector<CaseSection>& sections() const { return sections_; }
+  /// Gives a key, or another value to it: SECTION.KEY=VALUE. origin: who says so, for messages and case.resolved.ini.
+  /// What is wrong with it becomes a mistake. Local.
+  void set(const std::string& assignment, const std::string& origin);
+
   const Mistakes& mistakes() const { return mistakes_; }
   /// Null where the file has no such section or key.
   const CaseSection* find(std::string_view kind, std::string_view name = "") const;
@@ -80,7 +85,6 @@ class CaseFile {
  private:
   void parse_line(std::string_view line, const Place& place);
   void open_section(std::string_view title, const Place& place);
-  void add_override(const std::string& assignment);
   std::string nearest_sibling(std::string_view kind, std::string_view name) const;
 
   std::filesystem::path path_;

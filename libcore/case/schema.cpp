@@ -12,7 +12,7 @@ namespace malleus {
 namespace {
 
 std::string origin_of(const Key& key, const CaseEntry* entry) {
-  if (entry != nullptr) return entry->place.is_command_line() ? "command line" : entry->place.text();
+  if (entry != nullptr) return entry->place.text();
   if (key.has_levels) return fmt::format("accuracy level {}", level_names[static_cast<std::size_t>(key.level)]);
   return "default";
 }

@@ -157,8 +157,8 @@ void scale_sizes(const Communicator& comm, Mesh& mesh, FieldStore& fields, Real 
 
 /// With [accuracy] target_error or target_time: the settings that they lead to, of those that the case does not give
 /// by itself. Collective.
-std::vector<std::string> settings_for_targets(const Communicator& comm, const CommandLine& line, Simulator& simulator,
-                                              const Mesh& mesh, CaseReader& reader) {
+std::vector<std::string> settings_for_targets(const Communicator& comm, Simulator& simulator, const Mesh& mesh,
+                                              CaseReader& reader) {
   const AccuracySettings asked = simulator.common().accuracy;
   const bool gives_level = reader.file().find_entry("accuracy", "", "level") != nullptr;
   const bool gives_sizes = reader.file().find_entry("accuracy", "", "size_factor") != nullptr;
@@ -184,17 +184,21 @@ std::vector<std::string> settings_for_targets(const Communicator& comm, const Co
   expected.outlook = *outlook;
   const Choice choice = choose_for(asked, expected);
   log::info("{}", choice.reason);
-  std::vector<std::string> settings = line.overrides;
+  std::vector<std::string> settings;
   if (!gives_sizes) settings.push_back(fmt::format("accuracy.size_factor={:.4g}", choice.size_factor));
   if (!gives_level) settings.push_back("accuracy.level=" + level_name(choice.level));
   return settings;
 }
 
-int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator) {
+/// chosen: SECTION.KEY=VALUE that the targets of the case led to, besides what it gives.
+int run_case(const Communicator& comm, const CommandLine& line, Simulator& simulator,
+             const std::vector<std::string>& chosen = {}) {
   simulator.forget();
   CommonSections& common = simulator.common();
   common.case_settings.name = line.case_file.stem().string();
-  CaseReader reader(comm, CaseFile::read(comm, line.case_file, line.overrides));
+  CaseFile file = CaseFile::read(comm, line.case_file, line.overrides);
+  for (const std::string& setting : chosen) file.set(setting, "chosen for the targets of [accuracy]");
+  CaseReader reader(comm, std::move(file));
   simulator.describe(reader);
   reader.finish();
   FieldStore file_fields;
@@ -207,11 +211,8 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
   reader.check_mesh(names);
   RunSettings settings = run_settings(line, simulator);
   try {
-    if (std::vector<std::string> chosen = settings_for_targets(comm, line, simulator, mesh, reader); !chosen.empty()) {
-      CommandLine again = line;
-      again.overrides = std::move(chosen);
-      return run_case(comm, again, simulator);
-    }
+    const std::vector<std::string> settings_to_try = settings_for_targets(comm, simulator, mesh, reader);
+    if (!settings_to_try.empty()) return run_case(comm, line, simulator, settings_to_try);
     scale_sizes(comm, mesh, file_fields, common.accuracy.size_factor);
   } catch (const InputError& error) {
     throw InputError(reader.located(error.what()));

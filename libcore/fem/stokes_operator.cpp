@@ -284,6 +284,12 @@ void StokesOperator::update_viscosity(Real start_rate) {
   leave_out_still();
 }
 
+void StokesOperator::update_viscosity(std::span<const Real> shear_rates) {
+  shear_rate_.assign(shear_rates.begin(), shear_rates.end());
+  model_->evaluate(*mesh_, shear_rate_, viscosity_, slope_);
+  leave_out_still();
+}
+
 void StokesOperator::restore_viscosity(std::span<const Real> viscosity, std::span<const Real> shear_rate) {
   check(viscosity.size() == viscosity_.size() && shear_rate.size() == shear_rate_.size(), "a value an element");
   viscosity_.assign(viscosity.begin(), viscosity.end());

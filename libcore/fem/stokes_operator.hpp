@@ -125,9 +125,11 @@ class StokesOperator {
   /// Puts the prescribed velocities into a state, and the right number of borders. Local.
   void impose_constraints(StokesState& state) const;
 
-  /// Viscosities of the elements at the state's shear rates, or at the model's start_rates() for one [1/s]. Local.
+  /// Viscosities of the elements at the state's shear rates, at the model's start_rates() for one [1/s], or at given
+  /// ones [element]. Local.
   void update_viscosity(const StokesState& state);
   void update_viscosity(Real start_rate);
+  void update_viscosity(std::span<const Real> shear_rates);
   /// Viscosities and shear rates that an update gave before, on the same mesh, [element]. Local.
   void restore_viscosity(std::span<const Real> viscosity, std::span<const Real> shear_rate);
   std::span<const Real> viscosity() const noexcept { return viscosity_; }    ///< [element], Pa.s

@@ -54,6 +54,8 @@ class Loop {
   Real forcing(Real previous_norm);
   Real loosest() const;
   bool is_near() const;
+  bool is_cold() const { return options_.start_shear_rate > 0 || !options_.start_shear_rates.empty(); }
+  void start_viscosity();
   Real sound_norm() const;
   void choose_branches(int iteration, bool cold);
   bool reached() const {
@@ -77,6 +79,14 @@ void Loop::evaluate() {
   op_.update_viscosity(state_);
   report_ = op_.residual(state_, residual_);
   outcome_.assembly_seconds += watch.seconds();
+}
+
+void Loop::start_viscosity() {
+  if (options_.start_shear_rates.empty()) {
+    op_.update_viscosity(options_.start_shear_rate);
+  } else {
+    op_.update_viscosity(options_.start_shear_rates);
+  }
 }
 
 /// Solves for a step at the current residual. False where the linear solver failed.
@@ -156,7 +166,7 @@ void Loop::choose_branches(int iteration, bool cold) {
 /// 23 iterations from a cold start with it and 10 without.
 bool Loop::is_near() const {
   constexpr Real near = 0.1;
-  const bool cold = options_.start_shear_rate > 0;
+  const bool cold = is_cold();
   const bool cut = !outcome_.history.empty() && outcome_.history.back().step < 1;
   return report_.relative() < near || (!cold && !cut);
 }
@@ -261,7 +271,7 @@ bool Loop::may_use_newton() const {
 
 void Loop::solve_nonlinear_problem() {
   const int picard_start = op_.sensitivity() < picard_sensitivity ? picard_steps : 0;
-  const bool cold = options_.start_shear_rate > 0;
+  const bool cold = is_cold();
   op_.impose_constraints(state_);
   evaluate();
   int picard_left = cold ? picard_start : 0;
@@ -269,7 +279,7 @@ void Loop::solve_nonlinear_problem() {
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     const bool first = cold && iteration == 0;
     if (first) {
-      op_.update_viscosity(options_.start_shear_rate);
+      start_viscosity();
       report_ = op_.residual(state_, residual_);
     } else if (reached()) {
       outcome_.converged = true;

@@ -2,6 +2,7 @@
 
 /// Newton's method for the nonlinear Stokes equations.
 
+#include <span>
 #include <string>
 
 #include "fem/stokes_operator.hpp"
@@ -19,6 +20,8 @@ struct NewtonOptions {
   int set_iterations = 15;       ///< in which each step holds the branches of terms (contacts) as they are at its start
   /// Shear rate [1/s] at which viscosities are taken for the first step from a cold start; 0 = take the start state's.
   Real start_shear_rate = 0;
+  /// [element] the same where an earlier solution on another mesh tells them element by element; empty: it does not.
+  std::span<const Real> start_shear_rates = {};
 };
 
 /// One iteration, for the log.

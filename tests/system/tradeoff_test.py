@@ -82,7 +82,8 @@ class Targets(Folder):
         self.mesh(8)
         _, first = self.fill("out", "accuracy.target_error=0.01")
         text = (self.folder / "out" / "case.resolved.ini").read_text()
-        self.assertIn("size_factor", text)
+        for key in ("size_factor", "level"):
+            self.assertRegex(text, rf"(?m)^{key} = .*; chosen for the targets of \[accuracy\]$")
         _, second = self.fill("again", case="out/case.resolved.ini")
         self.assertEqual(first["nodes"], second["nodes"])
         self.assertEqual(first["final"]["pressure_gate_Pa"], second["final"]["pressure_gate_Pa"])
