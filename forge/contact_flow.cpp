@@ -47,6 +47,11 @@ void ContactFlow::mesh_changed() {
   linear_.reset();
   memory_.clear();
   contact_.points().clear();
+  is_transferred_ = false;
+}
+
+void ContactFlow::remeshed() {
+  mesh_changed();
   is_transferred_ = true;
 }
 

@@ -78,6 +78,9 @@ class ContactFlow final : public Component {
   bool pressure_is_free() const { return operator_->pressure_is_free(); }
   /// Drops what belongs to the old mesh. Collective.
   void mesh_changed();
+  /// The same after a remesh, where the fields are interpolated: the next solve starts from the strain rates of the old
+  /// mesh, which do not have the noise of interpolated velocities. Collective.
+  void remeshed();
   /// The largest rate at which an edge or an element of the last solution strains, 1/s; 0 before the first.
   Real largest_edge_rate() const noexcept { return edge_rate_; }
   Real largest_strain_rate() const noexcept { return strain_rate_; }

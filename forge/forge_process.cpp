@@ -126,7 +126,7 @@ RemeshedScene ForgeProcess::remeshed_scene() {
 /// A remesh moves free surfaces within their curvature and ends the history of the time scheme.
 void ForgeProcess::mesh_changed() {
   scene_->boundaries->mesh_changed();
-  flow_.mesh_changed();
+  flow_.remeshed();
   scene_->progress.last_step = 0;
   const std::vector<Real> volumes = body_volumes(*scene_);
   for (std::size_t i = 0; i < scene_->bodies.size(); ++i) scene_->bodies[i].volume = volumes[i];
