@@ -34,6 +34,11 @@ class Background {
   Site<D, Metric> site_on_edge(LocalId a, LocalId b, EntityOf entity, bool straight = false) const;
   /// Place for vertex v on its own entity, nearest to a wanted position.
   Site<D, Metric> site_for(LocalId v, const Point<D>& wanted) const;
+  /// Moves a site inside the body.
+  void move_site(Site<D, Metric>& site, const Point<D>& position) const {
+    site.position = position;
+    set_metric(site);
+  }
   /// May a curved patch have a face (edge in 2D) with these points? hint: facet (segment) of the patch near it, or -1.
   bool allows_face(const std::array<Point<D>, D>& face, LocalId hint) const;
   /// Facet (in 2D, segment) of a patch near a vertex, -1 where it is not known.

@@ -4,29 +4,6 @@
 
 namespace malleus::remeshing {
 
-template <int D, class Metric>
-bool Cavity<D, Metric>::gather_ball(LocalId vertex) {
-  begin_marks();
-  elements_.clear();
-  ring_.clear();
-  closed_ = true;
-  add(mesh_.vertex(vertex).element);
-  for (std::size_t n = 0; n < elements_.size(); ++n) {
-    const Element<D>& element = mesh_.element(elements_[n]);
-    for (std::size_t f = 0; f <= D; ++f) {
-      if (element.node[f] == vertex) continue;
-      const FaceRef ref = element.neighbour[f];
-      if (ref == no_face) {
-        closed_ = false;
-      } else if (!is_gathered(element_of(ref))) {
-        add(element_of(ref));
-      }
-    }
-    if (elements_.size() > largest) return false;
-  }
-  return true;
-}
-
 /// Turns around the edge (a, b) of a tetrahedron (a, b, p, q), leaving it by the face without p (forward) so that q
 /// stays, and records what comes next on the ring.
 template <int D, class Metric>
@@ -34,10 +11,12 @@ void Cavity<D, Metric>::walk_shell(LocalId from, std::array<LocalId, 4> abpq, bo
   LocalId e = from;
   LocalId leaves = forward ? abpq[2] : abpq[3];
   LocalId stays = forward ? abpq[3] : abpq[2];
-  while (elements_.size() <= largest) {
+  while (gathered_count_ <= largest) {
     const Element<D>& element = mesh_.element(e);
-    const FaceRef ref = element.neighbour[element.index_of(leaves)];
+    const std::size_t face = element.index_of(leaves);
+    const FaceRef ref = element.neighbour[face];
     if (ref == no_face) return;
+    inner_patch_ = inner_patch_ || element.patch[face] != no_patch;
     e = element_of(ref);
     if (e == from) {
       closed_ = true;
@@ -53,12 +32,10 @@ void Cavity<D, Metric>::walk_shell(LocalId from, std::array<LocalId, 4> abpq, bo
 
 template <int D, class Metric>
 bool Cavity<D, Metric>::gather_shell(LocalId from, std::size_t edge) {
-  begin_marks();
-  elements_.clear();
-  ring_.clear();
-  closed_ = false;
   const Element<D>& element = mesh_.element(from);
   const auto [a, b] = EdgeTable<D>::nodes[edge];
+  begin(element.node[a], element.node[b]);
+  closed_ = false;
   add(from);
   if constexpr (D == 2) {
     const std::size_t face = 3 - a - b;
@@ -66,6 +43,7 @@ bool Cavity<D, Metric>::gather_shell(LocalId from, std::size_t edge) {
     const FaceRef ref = element.neighbour[face];
     closed_ = ref != no_face;
     if (!closed_) return true;
+    inner_patch_ = element.patch[face] != no_patch;
     add(element_of(ref));
     ring_.push_back(mesh_.element(element_of(ref)).node[local_face(ref)]);
   } else {
@@ -80,19 +58,18 @@ bool Cavity<D, Metric>::gather_shell(LocalId from, std::size_t edge) {
       walk_shell(from, abpq, false);
     }
   }
-  return elements_.size() <= largest;
+  return gathered_count_ <= largest;
 }
 
 template <int D, class Metric>
 bool Cavity<D, Metric>::gather_pair(LocalId from, std::size_t face) {
   const FaceRef ref = mesh_.element(from).neighbour[face];
   if (ref == no_face) return false;
-  begin_marks();
-  elements_.clear();
-  ring_.clear();
+  begin(-1, -1);
   closed_ = true;
   add(from);
   add(element_of(ref));
+  inner_patch_ = mesh_.element(from).patch[face] != no_patch;
   return true;
 }
 
@@ -100,11 +77,12 @@ template <int D, class Metric>
 void Cavity<D, Metric>::find_border() {
   border_.clear();
   inner_.clear();
-  for (const LocalId e : elements_) {
+  const bool pair = kernel_a_ < 0;
+  for (const LocalId e : elements()) {
     const Element<D>& element = mesh_.element(e);
     for (std::size_t f = 0; f <= D; ++f) {
       const FaceRef ref = element.neighbour[f];
-      const bool inside = ref != no_face && is_gathered(element_of(ref));
+      const bool inside = ref != no_face && (pair ? is_of_pair(element_of(ref)) : holds_kernel(element, f));
       if (inside && (element.patch[f] == no_patch || element_of(ref) < e)) continue;
       BorderFace<D> face;
       for (std::size_t k = 0; k < D; ++k) face.node[k] = element.node[FaceTable<D>::nodes[f][k]];
@@ -119,14 +97,14 @@ void Cavity<D, Metric>::find_border() {
 template <int D, class Metric>
 Real Cavity<D, Metric>::worst_key() const {
   float worst = 2;
-  for (const LocalId e : elements_) worst = std::min(worst, mesh_.element(e).key);
+  for (const LocalId e : elements()) worst = std::min(worst, mesh_.element(e).key);
   return worst;
 }
 
 template <int D, class Metric>
 Real Cavity<D, Metric>::scaled_volume_sum(bool absolute) const {
   Real sum = 0;
-  for (const LocalId e : elements_) {
+  for (const LocalId e : elements()) {
     const Real volume = scaled_volume<D>(mesh_.points_of(mesh_.element(e)));
     sum += absolute ? std::abs(volume) : volume;
   }
@@ -183,6 +161,7 @@ void Cavity<D, Metric>::set_side(FaceRef face, FaceRef other, std::int16_t patch
   Element<D>& element = mesh_.element(element_of(face));
   element.neighbour[local_face(face)] = other;
   element.patch[local_face(face)] = patch;
+  element.tried = 0;
 }
 
 template <int D, class Metric>
@@ -234,7 +213,7 @@ void Cavity<D, Metric>::note_inner_links(const Star<D, Metric>& star) {
 
 template <int D, class Metric>
 LocalId Cavity<D, Metric>::take_slot() {
-  if (reused_ < elements_.size()) return elements_[reused_++];
+  if (reused_ < gathered_count_) return gathered_[reused_++];
   if (!mesh_.free_elements.empty()) {
     const LocalId e = mesh_.free_elements.back();
     mesh_.free_elements.pop_back();
@@ -255,6 +234,7 @@ void Cavity<D, Metric>::make_element(const BorderFace<D>& face, LocalId apex) {
   element.neighbour[D] = face.outside;
   element.patch[D] = face.patch;
   element.region = face.region;
+  element.tried = 0;
   if (face.outside != no_face) set_side(face.outside, face_ref(e, D), face.patch);
   for (const LocalId v : element.node) mesh_.vertex(v).element = e;
   element.key = static_cast<float>(mesh_.key_of_element(element));
@@ -285,9 +265,9 @@ void Cavity<D, Metric>::commit(const Star<D, Metric>& star) {
       make_element(face, star.apex);
     }
   }
-  for (std::size_t n = reused_; n < elements_.size(); ++n) {
-    mesh_.element(elements_[n]).node[0] = -1;
-    mesh_.free_elements.push_back(elements_[n]);
+  for (std::size_t n = reused_; n < gathered_count_; ++n) {
+    mesh_.element(gathered_[n]).node[0] = -1;
+    mesh_.free_elements.push_back(gathered_[n]);
   }
 }
 

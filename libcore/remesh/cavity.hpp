@@ -41,7 +41,12 @@ class Cavity {
   explicit Cavity(Mesh& mesh) : mesh_(mesh) {}
 
   /// Elements around a vertex; false where there are too many.
-  bool gather_ball(LocalId vertex);
+  bool gather_ball(LocalId vertex) {
+    return gather_ball_while(vertex, [](LocalId) { return true; });
+  }
+  /// The same, given up as soon as accept(v) fails for a vertex of the ball (which may be asked for more than once).
+  template <class Accept>
+  bool gather_ball_while(LocalId vertex, Accept&& accept);
   /// Elements around the edge of local vertices a, b of an element; ring() is filled. False where there are too many.
   bool gather_shell(LocalId element, std::size_t edge);
   /// The elements on both sides of a face; false on the boundary.
@@ -49,12 +54,15 @@ class Cavity {
   /// Border faces and inner patch faces of the gathered elements.
   void find_border();
 
-  std::span<const LocalId> elements() const { return elements_; }
+  std::span<const LocalId> elements() const { return {gathered_.data(), gathered_count_}; }
   std::span<const BorderFace<D>> border() const { return border_; }
   std::span<const BorderFace<D>> inner_patches() const { return inner_; }
   /// Vertices around the shell's edge, in order; a closed ring does not repeat its first.
   std::span<const LocalId> ring() const { return ring_; }
   bool is_closed() const { return closed_; }
+  /// Does a face of a patch hold the edge whose shell is gathered, or the vertex whose ball is, with elements on both
+  /// sides?
+  bool has_inner_patch() const { return inner_patch_; }
   /// Worst shape key of the gathered elements.
   Real worst_key() const;
   Real scaled_volume_sum(bool absolute) const;
@@ -91,10 +99,9 @@ class Cavity {
   static constexpr std::size_t slots = 4096;
 
   static bool holds(const std::array<LocalId, D>& nodes, LocalId v) {
-    for (const LocalId n : nodes) {
-      if (n == v) return true;
-    }
-    return false;
+    bool found = false;
+    for (const LocalId n : nodes) found |= n == v;
+    return found;
   }
   static bool vanishes(const BorderFace<D>& face, const Star<D, Metric>& star) {
     if (star.removed_a < 0 || !holds(face.node, star.removed_a)) return false;
@@ -107,15 +114,21 @@ class Cavity {
       return edge_key(nodes[(without + 1) % 3], nodes[(without + 2) % 3]);
     }
   }
-  void begin_marks() {
-    marks_.resize(mesh_.elements.size(), 0);
-    ++stamp_;
+  void begin(LocalId a, LocalId b) {
+    gathered_count_ = 0;
+    ring_.clear();
+    inner_patch_ = false;
+    kernel_a_ = a;
+    kernel_b_ = b;
   }
-  void add(LocalId e) {
-    marks_[static_cast<std::size_t>(e)] = stamp_;
-    elements_.push_back(e);
+  void add(LocalId e) { gathered_[gathered_count_++] = e; }
+  /// Does the face of an element lie inside the cavity if there is an element beyond it? All faces at the vertex of a
+  /// ball or at the edge of a shell do.
+  bool holds_kernel(const Element<D>& element, std::size_t face) const {
+    const LocalId opposite = element.node[face];
+    return opposite != kernel_a_ && opposite != kernel_b_;
   }
-  bool is_gathered(LocalId e) const { return marks_[static_cast<std::size_t>(e)] == stamp_; }
+  bool is_of_pair(LocalId e) const { return e == gathered_[0] || e == gathered_[1]; }
   void walk_shell(LocalId from, std::array<LocalId, 4> abpq, bool forward);
   void link(std::uint64_t key, FaceRef face, std::int16_t patch);
   void join(const Link& first, FaceRef face, std::int16_t patch, std::uint64_t key);
@@ -126,13 +139,15 @@ class Cavity {
   void make_element(const BorderFace<D>& face, LocalId apex);
 
   Mesh& mesh_;
-  std::vector<LocalId> elements_;
+  std::array<LocalId, largest + 2 * D + 2> gathered_{};
+  std::size_t gathered_count_ = 0;
   std::vector<BorderFace<D>> border_;
   std::vector<BorderFace<D>> inner_;
   std::vector<LocalId> ring_;
   std::vector<LocalId> made_;
-  std::vector<std::uint32_t> marks_;
-  std::uint32_t stamp_ = 0;
+  LocalId kernel_a_ = -1;  ///< the vertex of the ball, or an end of the shell's edge
+  LocalId kernel_b_ = -1;  ///< the other end
+  bool inner_patch_ = false;
   std::vector<std::uint32_t> vertex_marks_;
   std::uint32_t vertex_stamp_ = 0;
   bool closed_ = false;
@@ -142,6 +157,39 @@ class Cavity {
   std::uint32_t link_stamp_ = 0;
   std::vector<std::pair<std::uint64_t, std::int16_t>> inner_links_;
 };
+
+template <int D, class Metric>
+template <class Accept>
+bool Cavity<D, Metric>::gather_ball_while(LocalId vertex, Accept&& accept) {
+  begin(vertex, -1);
+  closed_ = true;
+  const std::uint32_t stamp = ++mesh_.stamp;
+  const LocalId first = mesh_.vertex(vertex).element;
+  mesh_.element(first).stamp = stamp;
+  for (const LocalId v : mesh_.element(first).node) {
+    if (!accept(v)) return false;
+  }
+  add(first);
+  for (std::size_t n = 0; n < gathered_count_; ++n) {
+    const Element<D>& element = mesh_.element(gathered_[n]);
+    for (std::size_t f = 0; f <= D; ++f) {
+      if (element.node[f] == vertex) continue;
+      const FaceRef ref = element.neighbour[f];
+      inner_patch_ = inner_patch_ || (ref != no_face && element.patch[f] != no_patch);
+      if (ref == no_face) {
+        closed_ = false;
+        continue;
+      }
+      Element<D>& next = mesh_.element(element_of(ref));
+      if (next.stamp == stamp) continue;
+      next.stamp = stamp;
+      if (!accept(next.node[local_face(ref)])) return false;
+      add(element_of(ref));
+    }
+    if (gathered_count_ > largest) return false;
+  }
+  return true;
+}
 
 template <int D, class Metric>
 template <class Visit>

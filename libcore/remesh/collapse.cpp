@@ -24,21 +24,6 @@ bool Operators<D, Metric>::may_collapse(LocalId v, LocalId w) const {
   return false;
 }
 
-template <int D, class Metric>
-bool Operators<D, Metric>::makes_long_edge(LocalId v, LocalId w) {
-  cavity_.new_vertex_marks();
-  cavity_.mark_vertex(v);
-  cavity_.mark_vertex(w);
-  for (const LocalId e : cavity_.elements()) {
-    for (const LocalId u : mesh_.element(e).node) {
-      if (cavity_.is_marked(u)) continue;
-      cavity_.mark_vertex(u);
-      if (mesh_.squared_length_of(u, w) > limits.longest_made) return true;
-    }
-  }
-  return false;
-}
-
 /// The link condition for a vertex on a patch or a curve: a vertex that is a neighbour of both v and w must be so
 /// through a common face, inside and on the surface; else the merger pinches the body.
 template <int D, class Metric>
@@ -108,14 +93,15 @@ template <int D, class Metric>
 bool Operators<D, Metric>::collapse(LocalId v, LocalId w) {
   const Vertex& vertex = mesh_.vertex(v);
   if (vertex.fixed || vertex.dimension == 0 || vertex.dimension < mesh_.vertex(w).dimension) return false;
-  if (!cavity_.gather_ball(v)) return false;
+  const auto stays_short = [&](LocalId u) { return u == v || mesh_.squared_length_of(u, w) <= limits.longest_made; };
+  if (!cavity_.gather_ball_while(v, stays_short)) return false;
   const Real worst = cavity_.worst_key();
-  if (worst <= 0 || makes_long_edge(v, w)) return false;
+  if (worst <= 0) return false;
   cavity_.find_border();
   if (!may_collapse(v, w)) return false;
   StarOf star = star_from(w);
   star.removed_a = v;
-  const Real limit = std::min(0.6 * worst, limits.collapse_key);
+  const Real limit = std::max(std::min(0.6 * worst, limits.collapse_key), limits.collapse_gain * worst);
   if (cavity_.evaluate(star, limit) <= limit) return false;
   if (vertex.dimension < D) {
     if (cavity_.removes_frozen(star) || !faces_stay_close(star)) return false;

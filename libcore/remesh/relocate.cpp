@@ -10,11 +10,11 @@ template <int D>
 constexpr Real unit_height = D == 3 ? 0.81649658092772603 : 0.86602540378443865;
 
 /// Vector normal to a face (edge in 2D), towards the inside.
-Point<3> inward_normal(const std::array<const Point<3>*, 3>& x) {
-  return cross(difference<3>(*x[1], *x[0]), difference<3>(*x[2], *x[0]));
+Point<3> inward_normal(const std::array<Point<3>, 3>& x) {
+  return cross(difference<3>(x[1], x[0]), difference<3>(x[2], x[0]));
 }
-Point<2> inward_normal(const std::array<const Point<2>*, 2>& x) {
-  const Point<2> e = difference<2>(*x[1], *x[0]);
+Point<2> inward_normal(const std::array<Point<2>, 2>& x) {
+  const Point<2> e = difference<2>(x[1], x[0]);
   return {-e[1], e[0]};
 }
 
@@ -29,6 +29,20 @@ Point<D> times(const Symmetric<D>& m, const Point<D>& v) {
 
 }  // namespace
 
+/// Takes down the faces opposite v of the gathered ball, relative to v's place.
+template <int D, class Metric>
+void Operators<D, Metric>::note_ball(LocalId v) {
+  const Point<D> origin = mesh_.point(v);
+  ball_.clear();
+  for (const LocalId e : cavity_.elements()) {
+    const Element<D>& element = mesh_.element(e);
+    const auto& face = FaceTable<D>::nodes[element.index_of(v)];
+    std::array<Point<D>, D> x;
+    for (std::size_t k = 0; k < D; ++k) x[k] = difference<D>(mesh_.point(element.node[face[k]]), origin);
+    ball_.add(x, inward_normal(x), element.key);
+  }
+}
+
 /// Weighted mean of the places where v would make each element at it regular with unit edges in v's metric; bad
 /// elements weigh more. The height over a face with Euclidean normal n is along inv(M) n.
 template <int D, class Metric>
@@ -36,32 +50,17 @@ Point<D> Operators<D, Metric>::ideal_position(LocalId v) const {
   const auto inverse = mesh_.metric(v).inverse();
   Point<D> sum{};
   Real weights = 0;
-  for (const LocalId e : cavity_.elements()) {
-    const Element<D>& element = mesh_.element(e);
-    const std::size_t at = element.index_of(v);
-    std::array<const Point<D>*, D> x;
-    for (std::size_t k = 0; k < D; ++k) x[k] = &mesh_.point(element.node[FaceTable<D>::nodes[at][k]]);
-    const Point<D> normal = inward_normal(x);
-    Point<D> along;
-    Real height = 0;
-    if constexpr (Metric::is_tensor) {
-      along = times<D>(inverse, normal);
-      height = unit_height<D> / std::sqrt(dot(normal, along));
-    } else {
-      along = normal;
-      height = unit_height<D> * std::sqrt(inverse[0] / dot(normal, normal));
-    }
-    Real weight = 1 / (0.05 + std::max(0.0F, element.key));
-    weight *= weight;
+  for (const auto& spoke : ball_.spokes()) {
+    Point<D> along = spoke.normal;
+    if constexpr (Metric::is_tensor) along = times<D>(inverse, spoke.normal);
+    const Real squares = Metric::is_tensor ? 1 / dot(spoke.normal, along) : inverse[0] / dot(along, along);
+    const Real height = unit_height<D> * std::sqrt(squares);
+    const Real root = 0.05 + std::max(0.0F, spoke.key);
+    const Real weight = 1 / (root * root);
     weights += weight;
-    for (std::size_t i = 0; i < D; ++i) {
-      Real centre = 0;
-      for (const auto* corner : x) centre += (*corner)[i];
-      sum[i] += weight * (centre / D + height * along[i]);
-    }
+    for (std::size_t i = 0; i < D; ++i) sum[i] += weight * (spoke.sum[i] / D + height * along[i]);
   }
-  for (Real& value : sum) value /= weights;
-  return sum;
+  return shifted<D>(mesh_.point(v), sum, 1 / weights);
 }
 
 /// Are the faces that curved patches have at v near the input surface?
@@ -89,6 +88,19 @@ bool Operators<D, Metric>::try_site(LocalId v, const Site<D, Metric>& site, Real
   return put_at(v, site, 0.9 * worst, gains);
 }
 
+/// Moves v there if the worst key of its elements gains a hundredth, and takes it over.
+template <int D, class Metric>
+bool Operators<D, Metric>::raise_worst(LocalId v, const Site<D, Metric>& site, Real& worst) {
+  Real reached = worst;
+  const auto gains = [&](Real now, Real) {
+    reached = now;
+    return now > 1.01 * worst;
+  };
+  if (!put_at(v, site, worst, gains)) return false;
+  worst = reached;
+  return true;
+}
+
 /// Vertices that were put on a chord of the surface are brought onto it as soon as their elements stand it.
 template <int D, class Metric>
 bool Operators<D, Metric>::return_to_surface(LocalId v, Real worst) {
@@ -104,6 +116,7 @@ template <class Accept>
 bool Operators<D, Metric>::put_at(LocalId v, const Site<D, Metric>& site, Real floor, Accept&& accept) {
   const Point<D> old_point = mesh_.point(v);
   const Metric old_metric = mesh_.metric(v);
+  const Point<D> shift = difference<D>(site.position, old_point);
   mesh_.point(v) = site.position;
   mesh_.metric(v) = site.metric;
   const auto elements = cavity_.elements();
@@ -111,7 +124,12 @@ bool Operators<D, Metric>::put_at(LocalId v, const Site<D, Metric>& site, Real f
   Real new_worst = 2;
   Real new_total = 0;
   for (std::size_t n = 0; n < elements.size() && new_worst > floor; ++n) {
-    const Real key = mesh_.key_of_element(mesh_.element(elements[n]));
+    Real key = 0;
+    if constexpr (Metric::is_tensor) {
+      key = mesh_.key_of_element(mesh_.element(elements[n]));
+    } else {
+      key = ball_.key(n, shift);
+    }
     keys_[n] = static_cast<float>(key);
     new_worst = std::min(new_worst, key);
     new_total += key;
@@ -141,6 +159,7 @@ void Operators<D, Metric>::note_changes() {
   }
   if (largest < limits.small_change) return;
   for (const LocalId e : elements) {
+    mesh_.element(e).tried = 0;
     enlist(e, pending::swap | pending::length);
     if (largest < limits.large_change) continue;
     for (const LocalId u : mesh_.element(e).node) enlist_vertex(u);
@@ -150,11 +169,12 @@ void Operators<D, Metric>::note_changes() {
 template <int D, class Metric>
 bool Operators<D, Metric>::relocate(LocalId v) {
   if (mesh_.vertex(v).fixed || mesh_.vertex(v).dimension == 0 || !cavity_.gather_ball(v)) return false;
+  note_ball(v);
   Real worst = 2;
   Real total = 0;
-  for (const LocalId e : cavity_.elements()) {
-    worst = std::min<Real>(worst, mesh_.element(e).key);
-    total += mesh_.element(e).key;
+  for (const auto& spoke : ball_.spokes()) {
+    worst = std::min<Real>(worst, spoke.key);
+    total += spoke.key;
   }
   if (worst <= 0) return false;
   if (background_.is_on_curved(v) && return_to_surface(v, worst)) {

@@ -180,7 +180,7 @@ void Remesher<D, Metric>::untangle() {
 
 template <int D, class Metric>
 void Remesher<D, Metric>::settle_sizes() {
-  constexpr int most_last_rounds = 8;
+  constexpr int most_last_rounds = D == 3 ? 2 : 8;
   const Limits& limits = operators_.limits;
   int last_rounds = 0;
   Real threshold = std::numeric_limits<Real>::max();
@@ -189,7 +189,7 @@ void Remesher<D, Metric>::settle_sizes() {
     if (threshold > limits.long_edge) threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
     timed("split", [&] { split_pass(threshold); });
     timed("collapse", [&] { collapse_pass(0.9 * limits.short_edge); });
-    timed("swap", [&] { swap_pass(quality_to_key<D>(0.63)); });
+    timed("swap", [&] { swap_pass(quality_to_key<D>(D == 3 ? 0.7 : 0.63)); });
     timed("move", [&] { move_pass(); });
     untangle();
     renumber_if_grown();
@@ -203,8 +203,8 @@ void Remesher<D, Metric>::settle_sizes() {
 
 template <int D, class Metric>
 void Remesher<D, Metric>::improve() {
-  operators_.limits.small_change = 0.05F;
-  operators_.limits.large_change = 0.05F;
+  operators_.limits.small_change = D == 3 ? 0.1F : 0.05F;
+  operators_.limits.large_change = D == 3 ? 0.15F : 0.05F;
   enlist_all();
   for (int round = 0; round < options_.improvement_rounds; ++round) {
     const bool last = round + 1 == options_.improvement_rounds;
@@ -217,6 +217,32 @@ void Remesher<D, Metric>::improve() {
   }
 }
 
+/// The worst elements get all that is known to help, the worst first, until little is gained.
+template <int D, class Metric>
+void Remesher<D, Metric>::mend_worst() {
+  constexpr int most_rounds = 5;
+  const Real key = quality_to_key<D>(D == 3 ? 0.6 : 0.75);
+  const Limits limits = operators_.limits;
+  operators_.limits.swap_gain = 1.01;
+  operators_.limits.collapse_gain = 1.01;
+  operators_.limits.longest_made = 3.0;
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<std::pair<float, LocalId>> worst;
+    for (std::size_t e = 0; e < mesh_.elements.size(); ++e) {
+      const Element<D>& element = mesh_.elements[e];
+      if (element.is_live() && element.key > 0 && element.key < key)
+        worst.emplace_back(element.key, static_cast<LocalId>(e));
+    }
+    std::sort(worst.begin(), worst.end());
+    std::size_t mended = 0;
+    for (const auto& [seen, e] : worst) {
+      if (mesh_.element(e).is_live() && mesh_.element(e).key == seen && operators_.mend(e)) ++mended;
+    }
+    if (mended <= worst.size() / 20) break;
+  }
+  operators_.limits = limits;
+}
+
 template <int D, class Metric>
 void Remesher<D, Metric>::run(RemeshReport& report) {
   ordered_elements_ = mesh_.count_elements();
@@ -224,6 +250,7 @@ void Remesher<D, Metric>::run(RemeshReport& report) {
   enlist_all();
   settle_sizes();
   improve();
+  timed("worst", [&] { mend_worst(); });
   timed("renumber", [&] { renumber_all(); });
   report.splits = operators_.counts.splits;
   report.collapses = operators_.counts.collapses;

@@ -22,6 +22,7 @@ class Remesher {
   void settle_sizes();
   void untangle();
   void improve();
+  void mend_worst();
   void enlist_all();
   void renumber_all();
   Real longest_waiting() const;

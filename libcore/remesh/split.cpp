@@ -122,12 +122,15 @@ bool Operators<D, Metric>::split(LocalId e, std::size_t edge) {
   if (!cavity_.gather_shell(e, edge)) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0) return false;
-  cavity_.find_border();
-  const EntityOf entity = edge_entity(a, b);
+  const bool inside = cavity_.is_closed() && !cavity_.has_inner_patch();
+  if (!inside) cavity_.find_border();
+  const EntityOf entity = inside ? EntityOf{D, -1} : edge_entity(a, b);
   if (entity.dimension < D && mesh_.vertex(a).fixed && mesh_.vertex(b).fixed) return false;
   if (D == 3 && entity.dimension == 1 && mesh_.curves[static_cast<std::size_t>(entity.id)].locked) return false;
   StarOf star{-1, background_.site_on_edge(a, b, entity), a, b};
-  if (is_near_ring(star) || cavity_.removes_frozen(star)) return false;
+  if (is_near_ring(star)) return false;
+  if (inside) cavity_.find_border();
+  if (cavity_.removes_frozen(star)) return false;
   const Real limit = std::min(limits.split_key, 0.3 * worst);
   if (cavity_.evaluate(star, limit) <= limit) {
     // The curve of the surface would turn an element over: the chord will do until relocation brings the point out.

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "remesh/operators.hpp"
 
 namespace malleus::remeshing {
@@ -75,6 +77,78 @@ std::size_t Operators<D, Metric>::edge_of(LocalId e, LocalId a, LocalId b) const
   return EdgeTable<D>::size;
 }
 
+/// Worst key of the star from ring vertex `from` (any in 2D) of an inner edge's shell; <= limit once it is known not to
+/// exceed it.
+template <int D, class Metric>
+Real Operators<D, Metric>::ring_key(LocalId a, LocalId b, std::size_t from, Real limit) const {
+  const auto ring = cavity_.ring();
+  const std::size_t n = ring.size();
+  PointPointers<D> x;
+  MetricPointers<D, Metric> m;
+  const auto set = [&](std::size_t at, LocalId v) {
+    x[at] = &mesh_.point(v);
+    m[at] = &mesh_.metric(v);
+  };
+  Real worst = 2;
+  const auto lowers = [&] {
+    worst = std::min(worst, shape_key<D>(x, m));
+    return worst <= limit;
+  };
+  if constexpr (D == 2) {
+    set(0, ring[0]);  // (a, b, ring[0]) is positive
+    set(1, a);
+    set(2, ring[1]);
+    if (lowers()) return worst;
+    set(1, ring[1]);
+    set(2, b);
+    lowers();
+    return worst;
+  } else {
+    set(0, ring[from]);
+    for (std::size_t k = 1; k + 1 < n; ++k) {
+      set(1, ring[(from + k) % n]);
+      set(2, ring[(from + k + 1) % n]);
+      set(3, b);
+      if (lowers()) return worst;
+      std::swap(x[1], x[2]);
+      std::swap(m[1], m[2]);
+      set(3, a);
+      if (lowers()) return worst;
+    }
+    return worst;
+  }
+}
+
+/// Notes at the elements of the shell that no swap of this edge gains.
+template <int D, class Metric>
+void Operators<D, Metric>::note_tried(LocalId a, LocalId b) {
+  for (const LocalId e : cavity_.elements()) {
+    auto& tried = mesh_.element(e).tried;
+    tried = static_cast<std::uint16_t>(tried | 1U << edge_of(e, a, b));
+  }
+}
+
+/// Turns an edge inside by the best star from its ring.
+template <int D, class Metric>
+bool Operators<D, Metric>::swap_inner_edge(LocalId a, LocalId b, Real worst) {
+  const auto ring = cavity_.ring();
+  // Stars from opposite vertices of a ring of four are the same; so are all of a ring of three or, in 2D, two.
+  const std::size_t candidates = ring.size() <= 3 ? 1 : ring.size() == 4 ? 2 : ring.size();
+  Real best = worst * limits.swap_gain + 1e-6;
+  LocalId apex = -1;
+  for (std::size_t n = 0; n < candidates; ++n) {
+    const Real key = ring_key(a, b, n, best);
+    if (key <= best) continue;
+    best = key;
+    apex = ring[n];
+  }
+  if (apex < 0) return false;
+  cavity_.find_border();
+  commit(star_from(apex));
+  ++counts.swaps;
+  return true;
+}
+
 template <int D, class Metric>
 bool Operators<D, Metric>::swap_edge(LocalId e, std::size_t edge) {
   const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
@@ -84,23 +158,15 @@ bool Operators<D, Metric>::swap_edge(LocalId e, std::size_t edge) {
   if (!cavity_.gather_shell(e, edge) || cavity_.ring().size() > largest_ring) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0) return false;
-  cavity_.find_border();
-  if (!cavity_.is_closed() || !cavity_.inner_patches().empty()) return D == 3 && swap_patch_edge(a, b, worst);
-  Real best = worst * limits.swap_gain + 1e-6;
-  StarOf found;
-  const auto ring = cavity_.ring();
-  const std::size_t candidates = ring.size() <= 3 ? 1 : ring.size();
-  for (std::size_t n = 0; n < candidates; ++n) {
-    const StarOf star = star_from(ring[n]);
-    const Real key = cavity_.evaluate(star, best);
-    if (key <= best) continue;
-    best = key;
-    found = star;
+  if (cavity_.is_closed() && !cavity_.has_inner_patch()) {
+    if (swap_inner_edge(a, b, worst)) return true;
+  } else if (D == 3) {
+    cavity_.find_border();
+    if (swap_patch_edge(a, b, worst)) return true;
+    cavity_.gather_shell(e, edge);
   }
-  if (found.apex < 0) return false;
-  commit(found);
-  ++counts.swaps;
-  return true;
+  note_tried(a, b);
+  return false;
 }
 
 /// Triangles at a vertex beyond the ideal number; 0 where there is none (corners).
@@ -145,22 +211,49 @@ bool Operators<D, Metric>::swap_face(LocalId e, std::size_t face) {
   if (mesh_.element(e).patch[face] != no_patch || !cavity_.gather_pair(e, face)) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0) return false;
-  cavity_.find_border();
-  const StarOf star = star_from(mesh_.element(e).node[face]);
+  const Element<D>& element = mesh_.element(e);
+  const FaceRef ref = element.neighbour[face];
   const Real limit = worst * limits.swap_gain + 1e-6;
-  if (cavity_.evaluate(star, limit) <= limit) return false;
-  commit(star);
+  if (pair_key(element, face, mesh_.element(element_of(ref)).node[local_face(ref)], limit) <= limit) return false;
+  cavity_.find_border();
+  commit(star_from(element.node[face]));
   ++counts.swaps;
   return true;
 }
 
+/// Worst key of the elements around the edge from the apex of a face to the vertex beyond it; <= limit once it is known
+/// not to exceed it.
+template <int D, class Metric>
+Real Operators<D, Metric>::pair_key(const Element<D>& element, std::size_t face, LocalId beyond, Real limit) const {
+  PointPointers<D> x = mesh_.points_of(element);
+  MetricPointers<D, Metric> m;
+  for (std::size_t i = 0; i <= D; ++i) m[i] = &mesh_.metric(element.node[i]);
+  Real worst = 2;
+  for (std::size_t i = 0; i <= D && worst > limit; ++i) {
+    if (i == face) continue;
+    const LocalId replaced = element.node[i];
+    x[i] = &mesh_.point(beyond);
+    m[i] = &mesh_.metric(beyond);
+    worst = std::min(worst, shape_key<D>(x, m));
+    x[i] = &mesh_.point(replaced);
+    m[i] = &mesh_.metric(replaced);
+  }
+  return worst;
+}
+
 template <int D, class Metric>
 bool Operators<D, Metric>::swap_at(LocalId e) {
+  const auto is_tried = [&](std::size_t bit) { return (mesh_.element(e).tried >> bit & 1U) != 0; };
   for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
-    if (swap_edge(e, edge)) return true;
+    if (!is_tried(edge) && swap_edge(e, edge)) return true;
   }
   for (std::size_t face = 0; D == 3 && face <= D; ++face) {
+    if (is_tried(6 + face)) continue;
     if (swap_face(e, face)) return true;
+    const FaceRef ref = mesh_.element(e).neighbour[face];
+    if (ref == no_face) continue;
+    auto& tried = mesh_.element(element_of(ref)).tried;
+    tried = static_cast<std::uint16_t>(tried | 1U << (6 + local_face(ref)));
   }
   return false;
 }

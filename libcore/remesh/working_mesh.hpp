@@ -41,17 +41,19 @@ struct Element {
   std::int16_t region = 0;                ///< index in WorkingMesh::regions
   std::uint8_t waits = 0;                 ///< bits of pending
   float key = 0;                          ///< shape key in metric space
+  std::uint32_t stamp = 0;                ///< of the last ball that was gathered with it, see WorkingMesh::stamp
+  std::uint16_t tried = 0;                ///< bits: edges (from 0) and faces (from 6) where no swap gained
 
   bool is_live() const { return node[0] >= 0; }
   bool has(LocalId vertex) const {
-    for (const LocalId n : node) {
-      if (n == vertex) return true;
-    }
-    return false;
+    bool found = false;
+    for (const LocalId n : node) found |= n == vertex;
+    return found;
   }
+  /// Without branches: where a vertex stands is random. D as well for a vertex that the element has not.
   std::size_t index_of(LocalId vertex) const {
-    std::size_t i = 0;
-    while (i < D && node[i] != vertex) ++i;
+    std::size_t i = D;
+    for (std::size_t k = 0; k < D; ++k) i = node[k] == vertex ? k : i;
     return i;
   }
 };
@@ -103,6 +105,7 @@ struct WorkingMesh {
   std::vector<Element<D>> elements;
   std::vector<LocalId> free_elements;
   std::vector<LocalId> free_vertices;
+  std::uint32_t stamp = 0;            ///< counts balls: an element with this stamp is in the present one
   std::vector<std::int32_t> regions;  ///< the input's numbers
   std::vector<Patch<D>> patches;
   std::vector<Curve> curves;

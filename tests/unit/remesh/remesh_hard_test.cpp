@@ -52,6 +52,27 @@ TEST(RemeshHard, TurnsInvertedElements) {
   }
 }
 
+/// A finished mesh turned by 120 degrees over its height has long thin elements everywhere; no bad one may stay.
+TEST(RemeshHard, MendsTheWorstElementsOfTwistedBox) {
+  RemeshMesh mesh = box_mesh(3, 4);
+  const Metric size = Metric::uniform(0.1);
+  remesh(mesh, size);
+  for (LocalId v = 0; v < mesh.nodes(); ++v) {
+    auto* x = &mesh.coordinates[static_cast<std::size_t>(3 * v)];
+    const Real angle = 2 * std::numbers::pi / 3 * x[2];
+    const Real a = x[0] - 0.5;
+    const Real b = x[1] - 0.5;
+    x[0] = 0.5 + a * std::cos(angle) - b * std::sin(angle);
+    x[1] = 0.5 + a * std::sin(angle) + b * std::cos(angle);
+  }
+  const Real volume = signed_volume(mesh);
+  const RemeshReport report = remesh(mesh, size);
+  test::expect_sound(mesh);
+  EXPECT_NEAR(signed_volume(mesh), volume, 0.015);  // its bent sides are only as fine as the elements
+  EXPECT_GT(report.after.minimum, 0.42);
+  EXPECT_GT(report.after.mean, 0.82);
+}
+
 /// A node pulled through the opposite face of its ball, and one put onto the boundary plane.
 TEST(RemeshHard, RepairsFlatElements) {
   RemeshMesh mesh = box_mesh(3, 4);
