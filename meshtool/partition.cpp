@@ -147,6 +147,7 @@ nlohmann::json cost_json(const PartitionCost& cost) {
           {"node_imbalance", cost.node_imbalance},
           {"cut", cost.cut},
           {"cut_edges", cost.cut_edges},
+          {"cut_couplings", cost.cut_couplings},
           {"communication_volume", cost.communication_volume},
           {"largest_volume", cost.largest_volume},
           {"interface_nodes", cost.interface_nodes},
@@ -170,6 +171,9 @@ nlohmann::json report_json(const PartitionPlan& plan, const MeshStatistics& mesh
   report["moved"] = plan.moved;
   report["moved_elements"] = plan.moved_elements;
   report["made_by"] = plan.made_by;
+  report["refinement"] = {{"rounds", plan.count.rounds},     {"flow_rounds", plan.count.flow_rounds},
+                          {"pairs", plan.count.pairs},       {"moved_vertices", plan.count.moved_vertices},
+                          {"messages", plan.count.messages}, {"bytes", plan.count.bytes}};
   report["seconds"] = seconds;
   report["processor_seconds"] = plan.processor_seconds;
   report["phases"] = plan.seconds;
@@ -178,18 +182,6 @@ nlohmann::json report_json(const PartitionPlan& plan, const MeshStatistics& mesh
   report["quality"] = {{"min", mesh.quality.min}, {"mean", mesh.quality.mean}, {"p01", mesh.quality.p01}};
   report["volume"] = {{"before", mesh.volume}, {"after", mesh.volume}};
   return report;
-}
-
-void print_plan(const PartitionPlan& plan, int parts) {
-  const PartitionCost& cost = plan.after;
-  fmt::print("{} parts by {}: cost {:.4f} of the ideal (before: {:.4f}), imbalance {:.2f} %, of nodes {:.2f} %\n",
-             parts, plan.made_by, cost.cost, plan.before.cost, 100 * cost.imbalance, 100 * cost.node_imbalance);
-  fmt::print("cut {} faces and {} edges, communication volume {}, at most {} neighbours, {} stray pieces, {} empty\n",
-             cost.cut, cost.cut_edges, cost.communication_volume, cost.max_neighbours, cost.stray_pieces,
-             cost.empty_parts);
-  if (plan.moved_elements > 0) {
-    fmt::print("moved {:.2f} % of the work, {} elements\n", 100 * plan.moved, plan.moved_elements);
-  }
 }
 
 /// Not the cheapest partition, but the present one with its borders moved inside.
@@ -281,7 +273,7 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
   write_result(comm, command, mesh, fields, plan, clock);
   const MeshStatistics statistics = mesh_statistics(comm, mesh);
   const GlobalId memory = comm.sum(peak_memory_bytes());
-  if (comm.is_root()) print_plan(plan, command.parts);
+  if (comm.is_root()) fmt::print("{}", describe_plan(plan));
   if (!command.report.empty()) {
     on_root(comm, [&] {
       write_file_atomically(command.report,

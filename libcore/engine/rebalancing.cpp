@@ -106,8 +106,7 @@ void Rebalancing::repartition(const Increment& increment) {
   const PartitionOptions options;
   const PartitionPlan plan = make_partition(*scene_.comm, *scene_.mesh, model, machine, options, here);
   const Real least_gain = is_measured() ? least_measured_gain : least_counted_gain;
-  const Real gain = plan.before.cost - plan.after.cost;
-  if (gain < least_gain * plan.before.cost || gain < options.moving_cost * plan.moved) return;
+  if (!is_worth_moving(plan, options, least_gain)) return;
   migrate(*scene_.comm, *scene_.mesh, *scene_.fields, plan.parts);
   scene_.mesh_moved();
   ++times_;

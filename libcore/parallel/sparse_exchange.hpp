@@ -20,9 +20,11 @@ struct Parcel {
 };
 
 /// Sends each parcel to its rank and returns those received, sorted by sender. At most one parcel a rank; parcels
-/// may be empty and may go to oneself. Of any size (sent in pieces below 2^30 bytes). The cost follows the number
-/// of partners, not of ranks (nonblocking consensus: Hoefler, Siebert, Lumsdaine 2010). Collective.
-std::vector<Parcel> sparse_exchange(const Communicator& comm, std::vector<Parcel> outgoing);
+/// may be empty and may go to oneself. Of any size: sent in pieces of at most piece_bytes, which an int counts, the
+/// same on all ranks. The cost follows the number of partners, not of ranks (nonblocking consensus: Hoefler, Siebert,
+/// Lumsdaine 2010). Collective.
+std::vector<Parcel> sparse_exchange(const Communicator& comm, std::vector<Parcel> outgoing,
+                                    std::size_t piece_bytes = std::size_t{1} << 30);
 
 /// The same for values of one trivially copyable type: rank -> values, in rank order on both sides. Collective.
 template <class T>

@@ -103,6 +103,7 @@ int PairRefiner::diffuse(Real tolerance, int rounds) {
     }
     if (send_flows(std::move(flows), tolerance) == 0) break;
   }
+  count_.flow_rounds = std::max<GlobalId>(count_.flow_rounds, round);
   return round;
 }
 

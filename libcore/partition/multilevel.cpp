@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/error.hpp"
 #include "parallel/gather.hpp"
 #include "partition/coarsen.hpp"
 #include "partition/replicate.hpp"
@@ -39,37 +40,79 @@ Real heaviest_vertex(const Communicator& comm, const WorkGraph& graph) {
 class Multilevel {
  public:
   Multilevel(const Communicator& comm, const Architecture& architecture, const std::vector<Real>& targets,
-             const MultilevelSettings& settings)
-      : comm_(comm), architecture_(architecture), targets_(targets), settings_(settings) {
+             const MultilevelSettings& settings, RefinementCount& count)
+      : comm_(comm), architecture_(architecture), targets_(targets), settings_(settings), count_(count) {
     few_ = few_vertices + settings.vertices_per_part * static_cast<GlobalId>(targets.size());
   }
 
-  std::vector<int> refine(const WorkGraph& finest, std::vector<int> parts) const {
-    if (is_copied_to_all(finest)) return refine_copied(finest, parts, settings_);
-    const std::vector<CoarseGraph> levels = make_levels(finest, parts);
-    const Real smallest = *std::min_element(targets_.begin(), targets_.end());
-    for (std::size_t level = levels.size(); level > 0; --level) {
-      const WorkGraph& graph = levels[level - 1].graph;
-      const Real grain = smallest > 0 ? heaviest_vertex(comm_, graph) / smallest : 0;
-      MultilevelSettings here = settings_;
-      here.tolerance = std::clamp(1.5 * grain, settings_.tolerance, std::max(settings_.tolerance, 0.03));
-      const bool is_coarsest = level == levels.size();
-      parts = is_coarsest && is_copied_to_all(graph)
-                  ? refine_copied(graph, parts, here)
-                  : refine_coarse(graph, std::move(parts), here.tolerance, is_coarsest);
-      const std::vector<LocalId>& coarse_of = levels[level - 1].coarse_of;
-      std::vector<int> finer(coarse_of.size());
-      for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
-      parts = std::move(finer);
+  /// The starts are tried down to the coarsest graph; the one that cuts least there is refined on all levels.
+  std::vector<int> refine(const WorkGraph& finest, std::vector<std::vector<int>> starts, std::size_t& chosen) const {
+    Descent best;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      Descent descent = descend(finest, std::move(starts[i]), starts.size() > 1);
+      if (i > 0 && descent.cut >= best.cut) continue;
+      best = std::move(descent);
+      chosen = i;
     }
-    return refine_finest(finest, std::move(parts), levels.empty() ? most_flow_rounds : few_flow_rounds);
+    return best.levels.empty() && is_copied_to_all(finest) ? best.parts : climb(finest, std::move(best));
   }
 
  private:
   static constexpr int most_flow_rounds = 30;
   static constexpr int few_flow_rounds = 6;
 
+  /// Graphs from the finest down, and parts that were refined on the coarsest.
+  struct Descent {
+    std::vector<CoarseGraph> levels;
+    std::vector<int> parts;
+    Real cut = 0;  ///< of the parts, only where it is asked for
+  };
+
   bool is_copied_to_all(const WorkGraph& graph) const { return comm_.size() > 1 && graph.ownership.total() <= few_; }
+
+  MultilevelSettings settings_on(const WorkGraph& graph) const {
+    const Real smallest = *std::min_element(targets_.begin(), targets_.end());
+    const Real grain = smallest > 0 ? heaviest_vertex(comm_, graph) / smallest : 0;
+    MultilevelSettings here = settings_;
+    here.tolerance = std::clamp(1.5 * grain, settings_.tolerance, std::max(settings_.tolerance, 0.03));
+    return here;
+  }
+
+  Descent descend(const WorkGraph& finest, std::vector<int> parts, bool wants_cut) const {
+    Descent descent;
+    if (is_copied_to_all(finest)) {
+      descent.parts = refine_copied(finest, parts, settings_);
+    } else {
+      descent.levels = make_levels(finest, parts);
+      if (!descent.levels.empty()) {
+        const WorkGraph& graph = descent.levels.back().graph;
+        const MultilevelSettings here = settings_on(graph);
+        parts = is_copied_to_all(graph) ? refine_copied(graph, parts, here)
+                                        : refine_coarse(graph, std::move(parts), here.tolerance, true);
+      }
+      descent.parts = std::move(parts);
+    }
+    if (wants_cut) descent.cut = linked_cut(comm_, coarsest(finest, descent), architecture_, descent.parts);
+    return descent;
+  }
+
+  static const WorkGraph& coarsest(const WorkGraph& finest, const Descent& descent) {
+    return descent.levels.empty() ? finest : descent.levels.back().graph;
+  }
+
+  std::vector<int> climb(const WorkGraph& finest, Descent descent) const {
+    std::vector<int> parts = std::move(descent.parts);
+    for (std::size_t level = descent.levels.size(); level > 0; --level) {
+      const WorkGraph& graph = descent.levels[level - 1].graph;
+      if (level < descent.levels.size())
+        parts = refine_coarse(graph, std::move(parts), settings_on(graph).tolerance, false);
+      const std::vector<LocalId>& coarse_of = descent.levels[level - 1].coarse_of;
+      std::vector<int> finer(coarse_of.size());
+      for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = parts[static_cast<std::size_t>(coarse_of[v])];
+      parts = std::move(finer);
+    }
+    return refine_finest(finest, std::move(parts), descent.levels.empty() ? most_flow_rounds : few_flow_rounds);
+  }
 
   /// Ever coarser graphs; parts become those of the coarsest's owned vertices.
   std::vector<CoarseGraph> make_levels(const WorkGraph& finest, std::vector<int>& parts) const {
@@ -103,6 +146,7 @@ class Multilevel {
       refiner.tidy(0.6 * tolerance);
     }
     refiner.smooth(tolerance, {settings_.coarse_passes, band_depth, 2, 200});
+    count_.add(refiner.count());
     return owned_parts(graph, std::move(refiner).take_parts());
   }
 
@@ -113,6 +157,7 @@ class Multilevel {
     for (int sweep = 0; sweep < 3 && refiner.tidy(settings_.tolerance); ++sweep) {
       refiner.smooth(settings_.tolerance, {1, band_depth, 1, 100});
     }
+    count_.add(refiner.count());
     return owned_parts(graph, std::move(refiner).take_parts());
   }
 
@@ -122,7 +167,8 @@ class Multilevel {
     const Communicator alone(MPI_COMM_SELF);
     const WorkGraph whole = replicate_graph(comm_, alone, graph);
     const std::vector<int> refined =
-        refine_multilevel(alone, whole, architecture_, gather_lists<int>(comm_, parts), targets_, settings);
+        refine_multilevel(alone, whole, architecture_, {gather_lists<int>(comm_, parts)}, targets_, settings, count_)
+            .parts;
     const auto first = refined.begin() + graph.ownership.begin();
     return {first, first + graph.owned()};
   }
@@ -131,15 +177,34 @@ class Multilevel {
   const Architecture& architecture_;
   const std::vector<Real>& targets_;
   const MultilevelSettings& settings_;
+  RefinementCount& count_;
   GlobalId few_;  ///< vertices up to which a graph is copied to all ranks
 };
 
 }  // namespace
 
-std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                                   std::vector<int> parts, const std::vector<Real>& targets,
-                                   const MultilevelSettings& settings) {
-  return Multilevel(comm, architecture, targets, settings).refine(graph, std::move(parts));
+Refined refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                          std::vector<std::vector<int>> starts, const std::vector<Real>& targets,
+                          const MultilevelSettings& settings, RefinementCount& count) {
+  check(!starts.empty(), "there is a start");
+  Refined refined;
+  refined.parts =
+      Multilevel(comm, architecture, targets, settings, count).refine(graph, std::move(starts), refined.start);
+  return refined;
+}
+
+Real linked_cut(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                std::vector<int> parts) {
+  parts = with_copies(graph, std::move(parts));
+  Real cut = 0;
+  for (LocalId v = 0; v < graph.owned(); ++v) {
+    const int part = parts[static_cast<std::size_t>(v)];
+    for (std::size_t j = graph.first(v); j < graph.last(v); ++j) {
+      const int other = parts[static_cast<std::size_t>(graph.neighbours[j])];
+      if (other != part) cut += graph.edge_weights[j] * architecture.inverse_link(part, other);
+    }
+  }
+  return comm.sum(cut);
 }
 
 }  // namespace malleus

@@ -15,11 +15,22 @@ struct MultilevelSettings {
   int fine_passes = 2;
 };
 
-/// Improves parts [owned vertex] towards targets [part]: neighbours of one part and rank are merged level by level; on
-/// the coarsest graph the loads are levelled, and on each level back borders are improved. Coarse vertices make large
-/// changes cheap. Returns the parts. Collective.
-std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                                   std::vector<int> parts, const std::vector<Real>& targets,
-                                   const MultilevelSettings& settings);
+struct Refined {
+  std::vector<int> parts;  ///< [owned vertex]
+  std::size_t start = 0;   ///< the one that it was made from
+};
+
+/// Improves starts, each a part for each owned vertex, towards targets [part]: neighbours of one part and rank are
+/// merged level by level; on the coarsest graph the loads are levelled, and on each level back borders are improved.
+/// Coarse vertices make large changes cheap. Of several starts the one that cuts least on its coarsest graph is carried
+/// on. What was done is added to count. Collective.
+Refined refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                          std::vector<std::vector<int>> starts, const std::vector<Real>& targets,
+                          const MultilevelSettings& settings, RefinementCount& count);
+
+/// Edges of the graph between parts, divided by the bandwidths of their links; both directions. parts: [owned vertex].
+/// Collective.
+Real linked_cut(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                std::vector<int> parts);
 
 }  // namespace malleus

@@ -32,6 +32,15 @@ void PairRefiner::start(std::vector<int> parts) {
   find_candidates();
 }
 
+void RefinementCount::add(const RefinementCount& other) {
+  rounds += other.rounds;
+  flow_rounds = std::max(flow_rounds, other.flow_rounds);
+  pairs += other.pairs;
+  moved_vertices += other.moved_vertices;
+  messages += other.messages;
+  bytes += other.bytes;
+}
+
 Real PairRefiner::imbalance() const {
   Real worst = 0;
   for (std::size_t p = 0; p < loads_.size(); ++p) {
@@ -356,9 +365,12 @@ std::vector<GlobalId> PairRefiner::improve(std::span<const PairGoal> goals, cons
   }();
   apply(solve(send_pieces(cut_pieces(goals, band), goals), goals, settings));
 
-  std::vector<Real> sums(goals.size() * 2, 0);  // weight gone from p to q, and vertices changed
+  std::vector<Real> sums(goals.size() * 2 + 1, 0);  // weight gone from p to q, vertices changed; at the end bytes
   for (std::size_t i = 0; i < band.size(); ++i) {
+    const bool is_second = parts_before[i] == goals[static_cast<std::size_t>(goal_of(band[i]))].q;
+    if (is_second) sums.back() += BandPiece::bytes_of(graph_.last(band[i]) - graph_.first(band[i]));
     if (part_of(band[i]) == parts_before[i]) continue;
+    if (is_second) sums.back() += sizeof(Answer);
     const auto g = static_cast<std::size_t>(goal_of(band[i]));
     const Real weight = graph_.weights[static_cast<std::size_t>(band[i])];
     sums[2 * g] += parts_before[i] == goals[g].p ? weight : -weight;
@@ -375,6 +387,8 @@ std::vector<GlobalId> PairRefiner::improve(std::span<const PairGoal> goals, cons
     goal_of_part_[static_cast<std::size_t>(goals[g].q)] = -1;
   }
   ++count_.rounds;
+  count_.messages += 2 * static_cast<GlobalId>(goals.size());
+  count_.bytes += static_cast<GlobalId>(sums.back());
   count_.pairs += static_cast<GlobalId>(goals.size());
   return moved;
 }

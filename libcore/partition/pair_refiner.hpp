@@ -42,11 +42,17 @@ struct RefinementSettings {
   int stall = 200;       ///< moves without a gain after which a search ends
 };
 
-/// What was done, for reports; the same on all ranks.
+/// What was done, for reports; the same on all ranks. Messages and bytes are those of a machine with a rank a part: the
+/// second part of a pair sends its side of the band to the first and hears which of its vertices changed.
 struct RefinementCount {
-  GlobalId rounds = 0;
-  GlobalId pairs = 0;
+  GlobalId rounds = 0;       ///< of disjoint pairs
+  GlobalId flow_rounds = 0;  ///< times that flows were solved and sent, of the most in one go
+  GlobalId pairs = 0;        ///< over all rounds
   GlobalId moved_vertices = 0;
+  GlobalId messages = 0;
+  GlobalId bytes = 0;
+
+  void add(const RefinementCount& other);
 };
 
 class PairRefiner {

@@ -102,6 +102,7 @@ class Planner {
     plan.made_by = std::move(best.made_by);
     plan.moved = best.moved;
     if (has_start) plan.moved_elements = count_moved(from, plan.parts);
+    plan.count = count_;
     plan.seconds = clock_.largest(comm_);
     plan.processor_seconds = comm_.max(clock_.processor_seconds());
     return plan;
@@ -142,25 +143,10 @@ class Planner {
     return candidate;
   }
 
-  /// Edges of the graph between parts, divided by the bandwidths of their links.
-  Real raw_cut(std::vector<int> parts) const {
-    parts.resize(static_cast<std::size_t>(graph_.vertices()));
-    graph_.halo.update_copies(std::span<std::int32_t>(parts), 1);
-    Real cut = 0;
-    for (LocalId v = 0; v < graph_.owned(); ++v) {
-      const int part = parts[static_cast<std::size_t>(v)];
-      for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
-        const int other = parts[static_cast<std::size_t>(graph_.neighbours[j])];
-        if (other != part) cut += graph_.edge_weights[j] * architecture_.inverse_link(part, other);
-      }
-    }
-    return comm_.sum(cut);
-  }
-
-  std::vector<int> refine(std::vector<int> parts) {
+  Refined refine(std::vector<std::vector<int>> starts) {
     MultilevelSettings settings;
     settings.tolerance = options_.tolerance;
-    return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, settings);
+    return refine_multilevel(comm_, graph_, architecture_, std::move(starts), targets_, settings, count_);
   }
 
   Candidate make_start(PartitionStart start) const {
@@ -178,27 +164,20 @@ class Planner {
     return {curve_parts(), "curve", {}, 0};
   }
 
-  /// The chosen start, or that of least cut, refined.
+  /// The chosen start, or the best of the geometric ones, refined.
   Candidate anew() {
     std::vector<Candidate> starts;
     if (options_.start == PartitionStart::best) {
-      for (const auto start : {PartitionStart::curve, PartitionStart::coordinate, PartitionStart::inertial})
+      for (const auto start : {PartitionStart::coordinate, PartitionStart::inertial, PartitionStart::curve})
         starts.push_back(make_start(start));
     } else {
       starts.push_back(make_start(options_.start));
     }
-    std::size_t best = 0;
-    Real least = 0;
-    for (std::size_t i = 0; i < starts.size(); ++i) {
-      const Real cut = raw_cut(starts[i].parts);
-      if (i > 0 && cut >= least) continue;
-      least = cut;
-      best = i;
-    }
+    std::vector<std::vector<int>> parts;
+    for (const Candidate& start : starts) parts.push_back(start.parts);
     clock_.end("start");
-    Candidate candidate = std::move(starts[best]);
-    candidate.parts = refine(std::move(candidate.parts));
-    candidate.made_by += " and refinement";
+    Refined refined = refine(std::move(parts));
+    Candidate candidate = {std::move(refined.parts), starts[refined.start].made_by + " and refinement", {}, 0};
     candidate.cost = cost_of(candidate.parts);
     return levelled(std::move(candidate));
   }
@@ -210,7 +189,7 @@ class Planner {
       finish(present, other);
       return other;
     }
-    Candidate best = {refine(present.parts), "flows and refinement", {}, 0};
+    Candidate best = {refine({present.parts}).parts, "flows and refinement", {}, 0};
     best.cost = cost_of(best.parts);
     finish(present, best);
     if (present.cost.imbalance > start_anew_from) {
@@ -248,6 +227,7 @@ class Planner {
       refiner.diffuse(levelling_tolerance, 6);
       refiner.smooth(1.3 * levelling_tolerance, {2, 3, 1, 100});
       refiner.tidy(levelling_tolerance);
+      count_.add(refiner.count());
       current.parts = std::move(refiner).take_parts();
       current.parts.resize(static_cast<std::size_t>(graph_.owned()));
       current.cost = cost_of(current.parts);
@@ -298,6 +278,7 @@ class Planner {
   PhaseClock clock_;
   WorkGraph graph_;
   std::vector<Real> targets_;
+  RefinementCount count_;
 };
 
 }  // namespace
@@ -308,6 +289,30 @@ PartitionPlan make_partition(const Communicator& comm, const Mesh& mesh, const W
   const bool has_start = comm.any(!from.empty());
   check(!has_start || from.size() == static_cast<std::size_t>(mesh.elements()), "each element has a present part");
   return Planner(comm, mesh, model, architecture, options).run(from, has_start);
+}
+
+std::string describe_plan(const PartitionPlan& plan) {
+  const PartitionCost& cost = plan.after;
+  std::string text = fmt::format(
+      "{} parts by {}: cost {:.4f} of the ideal (before: {:.4f}), imbalance {:.2f} %, of nodes {:.2f} %\n"
+      "cut {} faces and {} edges, communication volume {}, at most {} neighbours, {} stray pieces, {} empty\n",
+      cost.times.size(), plan.made_by, cost.cost, plan.before.cost, 100 * cost.imbalance, 100 * cost.node_imbalance,
+      cost.cut, cost.cut_edges, cost.communication_volume, cost.max_neighbours, cost.stray_pieces, cost.empty_parts);
+  if (plan.moved_elements > 0)
+    text += fmt::format("moved {:.2f} % of the work, {} elements\n", 100 * plan.moved, plan.moved_elements);
+  return text;
+}
+
+bool is_worth_moving(const PartitionPlan& plan, const PartitionOptions& options, Real least_gain) {
+  const Real gain = plan.before.cost - plan.after.cost;
+  return plan.moved_elements > 0 && gain >= least_gain * plan.before.cost && gain >= options.moving_cost * plan.moved;
+}
+
+GlobalId count_differences(const Communicator& comm, const PartitionPlan& one, const PartitionPlan& other) {
+  check(one.parts.size() == other.parts.size(), "plans are compared for one mesh");
+  GlobalId differences = 0;
+  for (std::size_t e = 0; e < one.parts.size(); ++e) differences += one.parts[e] != other.parts[e] ? 1 : 0;
+  return comm.sum(differences);
 }
 
 }  // namespace malleus

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "partition/pair_refiner.hpp"
 #include "partition/partition_cost.hpp"
 
 namespace malleus {
@@ -20,7 +21,7 @@ enum class Partitioner {
 
 /// What a new partition is refined from.
 enum class PartitionStart {
-  best,        ///< the curve, coordinate or inertial bisection, whichever cuts least
+  best,        ///< coordinate or inertial bisection or the curve, whichever cuts least on a coarse graph
   curve,       ///< stretches of the space-filling curve
   coordinate,  ///< recursive coordinate bisection
   inertial,    ///< recursive inertial bisection
@@ -45,6 +46,7 @@ struct PartitionPlan {
   Real moved = 0;                       ///< share of the work that changes part; 0 where no partition was given
   GlobalId moved_elements = 0;          ///< over all ranks
   std::string made_by;                  ///< what was chosen, in words
+  RefinementCount count;                ///< of all that was tried
   std::map<std::string, Real> seconds;  ///< wall time by phase, largest over the ranks
   Real processor_seconds = 0;           ///< of the rank that used most, evaluation apart
 };
@@ -55,5 +57,15 @@ struct PartitionPlan {
 PartitionPlan make_partition(const Communicator& comm, const Mesh& mesh, const WorkModel& model,
                              const Architecture& architecture, const PartitionOptions& options,
                              std::span<const int> from = {});
+
+/// What a plan costs and moves, in words; several lines. Local.
+std::string describe_plan(const PartitionPlan& plan);
+
+/// Whether a plan gains more than `least_gain` of the present cost, and more than moving costs (options.moving_cost):
+/// else it is to be refused. Local, the same on all ranks.
+bool is_worth_moving(const PartitionPlan& plan, const PartitionOptions& options, Real least_gain);
+
+/// Elements, of all ranks, to which two plans for one mesh give different parts; 0: the plans are alike. Collective.
+GlobalId count_differences(const Communicator& comm, const PartitionPlan& one, const PartitionPlan& other);
 
 }  // namespace malleus

@@ -43,5 +43,27 @@ TEST(SparseExchange, LongMessagesArriveWhole) {
   }
 }
 
+TEST(SparseExchange, ParcelsLongerThanAPieceArriveWhole) {
+  for (const std::size_t bytes :
+       {std::size_t{0}, std::size_t{1}, std::size_t{999}, std::size_t{1000}, std::size_t{100001}}) {
+    std::vector<Parcel> outgoing;
+    for (int rank = 0; rank < world().size(); ++rank) {
+      Parcel parcel = {rank, std::vector<std::byte>(bytes)};
+      for (std::size_t i = 0; i < bytes; ++i)
+        parcel.bytes[i] = static_cast<std::byte>((7 * i + static_cast<std::size_t>(world().rank() + 3 * rank)) % 251);
+      outgoing.push_back(std::move(parcel));
+    }
+    const std::vector<Parcel> received = sparse_exchange(world(), std::move(outgoing), 1000);
+    ASSERT_EQ(received.size(), static_cast<std::size_t>(world().size()));
+    for (const Parcel& parcel : received) {
+      ASSERT_EQ(parcel.bytes.size(), bytes);
+      for (std::size_t i = 0; i < bytes; ++i) {
+        ASSERT_EQ(parcel.bytes[i],
+                  static_cast<std::byte>((7 * i + static_cast<std::size_t>(parcel.rank + 3 * world().rank())) % 251));
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace malleus

@@ -97,6 +97,21 @@ TEST_P(Migration, AllElementsMayGatherOnOneRankAndSpreadAgain) {
   scene.expect_sound();
 }
 
+TEST_P(Migration, RanksMayHoldOneElementOrNone) {
+  Scene scene(GetParam());
+  std::vector<int> plan;  // element r on rank r, all others on the last
+  for (const GlobalId id : scene.mesh.element_ids)
+    plan.push_back(static_cast<int>(std::min<GlobalId>(id, world().size() - 1)));
+  migrate(world(), scene.mesh, scene.fields, plan);
+  if (world().rank() + 1 < world().size()) {
+    EXPECT_EQ(scene.mesh.elements(), 1);
+  }
+  scene.expect_sound();
+  const BalanceReport report = balance_by_cost(world(), scene.mesh, scene.fields, {}, false);
+  EXPECT_LE(report.cost_after, report.cost_before);
+  scene.expect_sound();
+}
+
 TEST_P(Migration, ElementsOnOneRankAreDealtOutEvenly) {
   Scene scene(GetParam());
   migrate(world(), scene.mesh, scene.fields, std::vector<int>(scene.mesh.element_ids.size(), 0));

@@ -123,6 +123,32 @@ TEST_P(Partitions, APlanWithoutGainMovesNothing) {
   EXPECT_EQ(plan.after.cost, plan.before.cost);
 }
 
+TEST_P(Partitions, PlansAreToldComparedAndRefused) {
+  const Mesh mesh = box(GetParam(), GetParam() == 2 ? 16 : 5);
+  const Architecture machine = equal_architecture(4);
+  PartitionOptions options;
+  options.method = Partitioner::curve;
+  const PartitionPlan curve = make_partition(world(), mesh, {}, machine, options);
+  const PartitionPlan better = make_partition(world(), mesh, {}, machine, {}, curve.parts);
+  EXPECT_EQ(count_differences(world(), curve, curve), 0);
+  EXPECT_EQ(count_differences(world(), curve, better), better.moved_elements);
+  EXPECT_NE(describe_plan(better).find("4 parts by " + better.made_by), std::string::npos);
+  EXPECT_GT(better.count.rounds, 0);
+  EXPECT_LE(better.count.flow_rounds, 10);
+  EXPECT_EQ(better.count.messages, 2 * better.count.pairs);
+  PartitionPlan plan = better;
+  plan.before.cost = 1.2;
+  plan.after.cost = 1.1;
+  plan.moved = 0.5;
+  plan.moved_elements = 7;
+  EXPECT_TRUE(is_worth_moving(plan, {}, 0.02));
+  EXPECT_FALSE(is_worth_moving(plan, {}, 0.1));  // too little gained
+  options.moving_cost = 0.3;
+  EXPECT_FALSE(is_worth_moving(plan, options, 0.02));  // moving costs more
+  plan.moved_elements = 0;
+  EXPECT_FALSE(is_worth_moving(plan, {}, 0));
+}
+
 TEST_P(Partitions, ARepairNeverCostsMoreAndMovesLess) {
   const Mesh mesh = box(GetParam(), GetParam() == 2 ? 20 : 6);
   const Architecture machine = equal_architecture(6);
