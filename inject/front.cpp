@@ -55,10 +55,12 @@ Front::Front(Scene& scene, FrontSet& fronts, FillingState& state, std::function<
     : scene_(scene), fronts_(fronts), state_(state), renew_velocity_(std::move(renew_velocity)) {
   scene_.fields.declare(scene_.mesh, {"fill_time", "s", Support::node, 1, Transfer::interpolate, false});
   scene_.fields.declare(scene_.mesh, {"weld_angle", "deg", Support::node, 1, Transfer::recompute, true});
+  if (scene_.settings.front.transport == FrontSettings::Transport::trace) traced_.emplace(scene_);
   rebuild();
 }
 
 std::string Front::purpose() const {
+  if (traced_) return "traces the front back along the stream, wets the walls, restores the volume";
   return fmt::format("moves the front{} in substeps of {:g} elements, wets the walls, restores the volume",
                      fronts_.size() > 1 ? "s" : "", scene_.settings.front.cfl);
 }
@@ -124,6 +126,13 @@ void Front::start() {
   const std::vector<Real> filled = fronts_.united();
   const std::span<Real> fill_time = scene_.fields["fill_time"].values();
   for (std::size_t n = 0; n < filled.size(); ++n) fill_time[n] = filled[n] > 0 ? 0 : not_filled;
+  if (traced_) {
+    traced_->trace(fronts_.values(0), *wetting_);
+    if (!traced_->follows_formulas()) {
+      const std::span<const Real> arrival = scene_.fields["arrival_time"].values();
+      std::copy(arrival.begin(), arrival.end(), fill_time.begin());
+    }
+  }
   state_.initial = state_.filled = std::accumulate(targets_.begin(), targets_.end(), 0.0);
 }
 
@@ -151,8 +160,25 @@ Real Front::substep_rate() {
   return renew_velocity_ ? fastest : std::min(fastest, most_over_front * crossing_rate());
 }
 
+/// One step whatever its length. Without inlets the volume that the trace finds is the answer's measure: it stays.
+Outcome Front::advance_traced(const Increment& increment) {
+  const std::vector<Real> before = fronts_.united();
+  const Exchange through = exchange(0);
+  traced_->evaluate(increment.time, fronts_.values(0));
+  if (!traced_->follows_formulas()) {
+    targets_[0] = std::min(targets_[0] + (through.entering - through.leaving) * increment.dt, scene_.cavity);
+    state_.left += through.leaving * increment.dt;
+    restore_volumes();
+  }
+  state_.injected += state_.inflow() * increment.dt;
+  mark_fill_time(before, increment.start(), increment.dt);
+  substeps_ = 1;
+  return Outcome::done();
+}
+
 Outcome Front::advance(const Increment& increment) {
   snapshot();
+  if (traced_) return advance_traced(increment);
   substeps_ = 0;
   Real left = increment.dt;
   while (left > 0) {

@@ -5,10 +5,12 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "engine/component.hpp"
 #include "inject/filling_state.hpp"
 #include "inject/front_set.hpp"
+#include "inject/traced_front.hpp"
 #include "solvers/level_set_transport.hpp"
 #include "solvers/level_set_wetting.hpp"
 
@@ -63,6 +65,7 @@ class Front final : public Component {
   void warn_of_backflow();
   Real substep_rate();
   Outcome substep(Real start, Real dt);
+  Outcome advance_traced(const Increment& increment);
   void mark_fill_time(const std::vector<Real>& before, Real start, Real dt);
   void snapshot();
 
@@ -72,7 +75,8 @@ class Front final : public Component {
   std::function<void(Real)> renew_velocity_;
   std::unique_ptr<LevelSetTransport> transport_;
   std::unique_ptr<WallWetting> wetting_;
-  std::vector<Real> targets_;  ///< volume of each fluid, m^3
+  std::optional<TracedFront> traced_;  ///< with transport = trace
+  std::vector<Real> targets_;          ///< volume of each fluid, m^3
   int substeps_ = 0;
   GlobalId redistances_ = 0;
   GlobalId pockets_filled_ = 0;

@@ -20,6 +20,7 @@ namespace {
 constexpr Real unlimited = std::numeric_limits<Real>::infinity();
 /// Elements that the front may cross in an increment where the flow stays as it is: what an output shows.
 constexpr Real frozen_stride = 4;
+constexpr Real traced_stride = 16;  ///< where any number costs the same
 /// Below this share of what the pressures could do a fluid is at rest.
 constexpr Real share_of_rest = 1e-4;
 /// Away from power-law scenes the shear-rate cut-off plays no part.
@@ -150,6 +151,7 @@ std::vector<std::string> FillingProcess::output_fields() const {
   for (const std::string& name : fronts_.names()) names.push_back(name);
   names.emplace_back("fill_time");
   if (front_) names.emplace_back("weld_angle");
+  if (scene_.fields.has("arrival_time")) names.emplace_back("arrival_time");
   if (has_gas()) names.emplace_back("air_pressure");
   return names;
 }
@@ -189,7 +191,7 @@ Real FillingProcess::stride() const {
   if (flow_ && flow.update.kind == FlowUpdate::Kind::automatic) {
     return std::max(flow.update_distance, scene_.settings.front.cfl);
   }
-  return frozen_stride;
+  return scene_.settings.front.transport == FrontSettings::Transport::trace ? traced_stride : frozen_stride;
 }
 
 /// No more comes in than there is room for.

@@ -317,6 +317,25 @@ bool InjectCase::is_driven() const {
          std::any_of(common.boundaries.begin(), common.boundaries.end(), acts);
 }
 
+/// A trace goes along streams that stay as they are.
+void InjectCase::check_trace(CaseReader& reader) const {
+  const auto refuse = [&](bool is_wrong, const char* why) {
+    if (is_wrong) reader.fail("front", "transport", std::string("trace ") + why + "; use crank-nicolson");
+  };
+  refuse(fluids.size() > 2, "is for two fluids");
+  refuse(!flow.is_prescribed() && flow.update.kind != FlowUpdate::Kind::once,
+         "is for a flow that stays as it is: [flow] update = once, or a prescribed one");
+  refuse(!flow.is_prescribed() && inlets.empty(), "of a solved flow starts at an [inlet.NAME]");
+  const bool changes = std::any_of(flow.prescribed.begin(), flow.prescribed.end(),
+                                   [](const auto& formula) { return formula && formula->depends_on_time(); });
+  refuse(changes && !inlets.empty(), "with an [inlet.NAME] is for a flow that does not depend on t");
+  refuse(common.remesh && common.remesh->active, "keeps its mesh: remove [remesh]");
+  refuse(common.inertia.has_value(), "is for flows without [inertia]");
+  refuse(std::any_of(fluids.begin(), fluids.end(),
+                     [](const FluidSettings& fluid) { return fluid.law == FluidSettings::Law::empty; }),
+         "wants a viscosity of all fluids, not void");
+}
+
 void InjectCase::check_inertia(CaseReader& reader) const {
   for (const FluidSettings& fluid : fluids) {
     if (!fluid.density && fluid.law != FluidSettings::Law::empty) {
@@ -365,9 +384,7 @@ void InjectCase::check(CaseReader& reader) const {
   refuse(common.air && (!is_mixture || fluids[static_cast<std::size_t>(std::max(0, initial_fluid()))].law !=
                                            FluidSettings::Law::empty),
          "air", "is about air that is not modelled as a fluid: [initial] fluid needs law = void");
-  if (front.transport == FrontSettings::Transport::trace) {
-    reader.fail("front", "transport", "trace is not available yet; use crank-nicolson");
-  }
+  if (front.transport == FrontSettings::Transport::trace) check_trace(reader);
   for (std::size_t i = 0; i < fluids.size(); ++i) {
     if (fluids[i].law != FluidSettings::Law::empty || (is_mixture && static_cast<int>(i) == initial_fluid())) continue;
     reader.fail("fluid." + fluids[i].name, "law",

@@ -171,6 +171,7 @@ struct InjectCase {
   void check(CaseReader& reader) const;
 
   void check_inertia(CaseReader& reader) const;
+  void check_trace(CaseReader& reader) const;
   int fluid_index(const std::string& name) const;  ///< in `fluids`, -1 = none
   bool is_driven() const;                          ///< something can move the fluids
   int initial_fluid() const;                       ///< what fills the cavity at the start
