@@ -222,6 +222,8 @@ template <int D, class Metric>
 void Remesher<D, Metric>::mend_worst() {
   constexpr int most_rounds = 5;
   const Real key = quality_to_key<D>(D == 3 ? 0.6 : 0.75);
+  const auto most =
+      static_cast<std::size_t>(200 + mesh_.count_elements() / 400);  // where all is bad, this helps little
   const Limits limits = operators_.limits;
   operators_.limits.swap_gain = 1.01;
   operators_.limits.collapse_gain = 1.01;
@@ -234,6 +236,7 @@ void Remesher<D, Metric>::mend_worst() {
         worst.emplace_back(element.key, static_cast<LocalId>(e));
     }
     std::sort(worst.begin(), worst.end());
+    worst.resize(std::min(worst.size(), most));
     std::size_t mended = 0;
     for (const auto& [seen, e] : worst) {
       if (mesh_.element(e).is_live() && mesh_.element(e).key == seen && operators_.mend(e)) ++mended;
