@@ -51,7 +51,8 @@ void add_options(CLI::App& app, PartitionCommand& c) {
   app.add_option("--element-weight", c.model.element, "Work per element (default 1)")
       ->check(CLI::Range(0.0, 1e300))
       ->type_name("W");
-  app.add_option("--node-weight", c.model.node, "Work per node (default 100)")
+  app.add_option("--node-weight", c.model.node,
+                 "Work per node (default 16, as this program's solver; 100: the paper's)")
       ->check(CLI::Range(0.0, 1e300))
       ->type_name("W");
   app.add_option("--communication-weight", c.model.communication,

@@ -16,7 +16,7 @@ int run_probe(const Communicator& comm, const std::vector<std::string>& argument
   app.add_option("OUT", output, "The architecture file to write, for meshtool partition --architecture")->required();
   app.add_option("--seconds", options.seconds, "Time spent on the speeds (default 0.5)")
       ->check(CLI::Range(0.01, 600.0));
-  app.add_option("--node-weight", options.node_weight, "Work per node that the bandwidths refer to (default 100)")
+  app.add_option("--node-weight", options.node_weight, "Work per node that the bandwidths refer to (default 16)")
       ->check(CLI::PositiveNumber);
   if (!parse_options(comm, app, arguments)) return exit_code::done;
   const MachineProbe probe = probe_machine(comm, options);

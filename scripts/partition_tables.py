@@ -81,11 +81,17 @@ def all_tables(rows):
     return "\n\n".join(f"{name}\n\n{make(rows)}" for name, make in TABLES.items() if scenes(rows, name))
 
 
+def replace(text, name, content):
+    """The page with other content between the two marks of that name."""
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    before, rest = text.split(begin, 1)
+    return f"{before}{begin}\n{content}\n{end}{rest.split(end, 1)[1]}"
+
+
 def write_page(page, rows):
-    """Puts the tables between their marks in a page."""
+    """Puts those tables for which something was measured between their marks in a page."""
     text = page.read_text()
     for name, make in TABLES.items():
-        begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-        before, rest = text.split(begin, 1)
-        text = f"{before}{begin}\n{make(rows)}\n{end}{rest.split(end, 1)[1]}"
+        if scenes(rows, name):
+            text = replace(text, name, make(rows))
     page.write_text(text)

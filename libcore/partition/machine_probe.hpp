@@ -7,13 +7,15 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/node_owners.hpp"
 #include "parallel/communicator.hpp"
 
 namespace malleus {
 
 struct ProbeOptions {
-  Real seconds = 0.5;      ///< spent on the speed of each processor, all at once, as in a run
-  Real node_weight = 100;  ///< work per node in the WorkModel that the file is for: it gives bandwidths their unit
+  Real seconds = 0.5;  ///< spent on the speed of each processor, all at once, as in a run
+  Real node_weight =
+      node_work_in_elements;  ///< work per node in the WorkModel that the file is for: it gives bandwidths their unit
 };
 
 /// What was measured; complete on the root, which writes it.

@@ -6,7 +6,6 @@
 
 #include "base/error.hpp"
 #include "mesh/faces.hpp"
-#include "mesh/node_owners.hpp"
 #include "mesh/number_table.hpp"
 #include "parallel/sparse_exchange.hpp"
 
@@ -128,12 +127,6 @@ void set_centres(const Mesh& mesh, WorkGraph& graph) {
 }
 
 }  // namespace
-
-WorkModel solver_work() {
-  WorkModel model;
-  model.node = node_work_in_elements;
-  return model;
-}
 
 std::vector<Real> element_work(const Communicator& comm, const Mesh& mesh, const WorkModel& model) {
   std::vector<Real> valence(static_cast<std::size_t>(mesh.nodes()), 0);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mesh/mesh.hpp"
+#include "mesh/node_owners.hpp"
 #include "partition/couplings.hpp"
 
 namespace malleus {
@@ -14,16 +15,17 @@ namespace malleus {
 /// (elements with a common face, nodes with a common edge) that lie in different parts. The paper's combined dual and
 /// nodal graph (section 3.1.1).
 struct WorkModel {
-  Real element = 1;          ///< assembling an element, >= 0
-  Real node = 100;           ///< solving for a node, >= 0
-  Real communication = 1;    ///< per cut edge of either graph, at bandwidth 1, >= 0
+  Real element = 1;                   ///< assembling an element, >= 0
+  Real node = node_work_in_elements;  ///< solving for a node, >= 0; the paper's times (its table 2) say 100
+  Real communication = 1;             ///< per cut edge of either graph, at bandwidth 1, >= 0
   std::vector<Real> factor;  ///< [element] relative work of each, >= 0; empty = 1. Scaled so that the total stays.
   std::vector<NodeCoupling> couplings;  ///< beside the mesh, each on one rank
 };
 
-/// The work of this program's own solver, for sharing out its runs (mesh/node_owners.hpp). WorkModel's defaults are the
-/// ratio of the paper's times (its table 2), with a less able preconditioner.
-WorkModel solver_work();
+/// The work of this program's own solver: the defaults.
+inline WorkModel solver_work() {
+  return {};
+}
 
 /// The elements of all ranks as vertices, their common faces as edges. Vertices of this rank are [0, owned()), in the
 /// order of the mesh; copies of their neighbours on other ranks follow. Coarser graphs, whose vertices are groups of
