@@ -354,7 +354,8 @@ void Flow::note_freezing(std::span<const Real> old_velocity) {
 }
 
 nlohmann::json Flow::save() const {
-  nlohmann::json saved = {{"borders", unknowns_.borders}, {"freezing_error", freezing_error_}};
+  nlohmann::json saved = {
+      {"borders", unknowns_.borders}, {"freezing_error", freezing_error_}, {"is_solved", is_solved_}};
   if (void_) saved["void"] = void_->save();
   if (history_) saved["history"] = history_->save();
   return saved;
@@ -362,6 +363,11 @@ nlohmann::json Flow::save() const {
 
 void Flow::load(const nlohmann::json& saved) {
   freezing_error_ = saved.at("freezing_error");
+  is_solved_ = saved.at("is_solved");
+  if (!is_solved_) {  // saved behind a remesh after which the run failed
+    if (history_) history_->load(saved.at("history"));
+    return;
+  }
   const auto dim = static_cast<std::size_t>(scene_.mesh.dim);
   const std::span<const Real> velocity = scene_.fields["velocity"].values();
   const std::span<const Real> pressure = scene_.fields["pressure"].values();
@@ -371,7 +377,6 @@ void Flow::load(const nlohmann::json& saved) {
     std::copy_n(velocity.data() + node * dim, dim, unknowns_.nodes.data() + node * (dim + 1));
     unknowns_.nodes[node * (dim + 1) + dim] = pressure[node];
   }
-  is_solved_ = true;
   refresh_mixture();
   std::vector<GateDrive> drives;
   for (const GateState& gate : state_.gates) drives.push_back(gate.drive);
@@ -386,6 +391,7 @@ void Flow::load(const nlohmann::json& saved) {
 }
 
 std::vector<Real> Flow::save_local() const {
+  if (!is_solved_) return {};
   std::vector<Real> saved = unknowns_.nodes;
   for (const std::span<const Real> values :
        {operator_->viscosity(), operator_->shear_rate(), std::span<const Real>(scene_.subscale_velocity)}) {
@@ -395,6 +401,7 @@ std::vector<Real> Flow::save_local() const {
 }
 
 void Flow::load_local(std::span<const Real> saved) {
+  if (!is_solved_) return;
   const auto take = [&](std::size_t count) {
     check(count <= saved.size(), "a saved flow fits its mesh");
     const std::span<const Real> taken = saved.first(count);

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "engine/resources.hpp"
+#include "parallel/agreement.hpp"
+#include "parallel/fault.hpp"
 #include "remesh/error_metric.hpp"
 
 namespace malleus {
@@ -95,6 +98,33 @@ Outcome Remeshing::advance(const Increment& increment) {
   return is_due(increment, fit) ? remesh(increment, metric) : Outcome::done();
 }
 
+/// Mesh and fields as they are, for the case that no new mesh comes about: a remesh that fails leaves them half-way.
+class Remeshing::Backup {
+ public:
+  explicit Backup(const RemeshedScene& scene) : mesh_(*scene.mesh) {
+    for (const Field* field : std::as_const(*scene.fields).all()) {
+      values_.emplace(field->spec().name, std::vector<Real>(field->values().begin(), field->values().end()));
+    }
+  }
+
+  void put_back(const RemeshedScene& scene) {
+    *scene.mesh = std::move(mesh_);
+    for (Field* field : scene.fields->all()) {
+      const std::string name = field->spec().name;
+      if (values_.contains(name)) {
+        field->assign(std::move(values_.at(name)));
+      } else {
+        scene.fields->remove(name);  // the remesher's own
+      }
+    }
+    scene.mesh_changed();
+  }
+
+ private:
+  Mesh mesh_;
+  std::map<std::string, std::vector<Real>> values_;
+};
+
 Outcome Remeshing::remesh(const Increment& increment, const Metric& metric) {
   const Real start = wall_clock();
   DistributedRemeshOptions options;
@@ -102,13 +132,17 @@ Outcome Remeshing::remesh(const Increment& increment, const Metric& metric) {
   options.kept_regions = scene_.kept_regions;
   options.balances_by_cost = scene_.balances_by_cost;
   if (scene_.before) scene_.before();
+  Backup backup(scene_);
   DistributedRemeshReport report;
   try {
     report = remesh_distributed(*scene_.comm, *scene_.mesh, *scene_.fields, metric, options);
+    agree(*scene_.comm, [] { pass_fault_point("new_mesh"); });
   } catch (const InputError& error) {  // raised on all ranks alike: the surface has come to touch itself
+    backup.put_back(scene_);
     return Outcome::fail(fmt::format("the mesh cannot be made anew: {}", error.what()));
   }
   if (report.after.inverted > 0) {
+    backup.put_back(scene_);
     return Outcome::fail(
         fmt::format("{} elements are turned over and no operation could repair them", report.after.inverted));
   }

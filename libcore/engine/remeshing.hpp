@@ -41,7 +41,7 @@ class Remeshing final : public Component {
   std::string name() const override { return "remeshing"; }
   std::string purpose() const override;
   FieldUse uses() const override { return {{}, {}, {}}; }
-  /// Where it fails to turn inverted elements the outcome is `failed`.
+  /// Where no sound new mesh comes about the outcome is `failed`, and mesh and fields are those of before.
   Outcome advance(const Increment& increment) override;
   /// The new mesh stays: it holds the same state.
   void roll_back() override {}
@@ -58,6 +58,8 @@ class Remeshing final : public Component {
   }
 
  private:
+  class Backup;
+
   bool follows_error() const { return settings_.nodes || settings_.error; }
   Metric wanted_metric() const;
   Metric base_metric() const;

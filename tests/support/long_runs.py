@@ -59,6 +59,8 @@ heat_capacity = 600
 initial = 1300
 [gravity]
 acceleration = 0 -9.81
+[partition]
+method = cost
 [probe.middle]
 point = 0.5 0.4
 fields = velocity temperature
@@ -68,7 +70,9 @@ moves = with-material
 acceleration = 0 -9.81
 [remesh]
 size = 1 mm
-every = 3
+min_size = 0.7 mm
+[partition]
+method = cost
 [probe.middle]
 point = 0.005 0.002
 fields = velocity pressure

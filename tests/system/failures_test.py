@@ -6,7 +6,7 @@ import tempfile
 import time
 import unittest
 
-from long_runs import PROGRAMS, finish, start, write_case
+from long_runs import PROGRAMS, digits, finish, start, write_case, write_full_case
 
 RANKS = 2
 CODES = {"storage": 4, "input": 2, "defect": 1, "memory": 1}
@@ -64,6 +64,23 @@ class Failures(unittest.TestCase):
         code, said = finish(start("forge", case, self.directory / "out", "--restart", ranks=RANKS))
         self.assertEqual(code, 0, said)
         self.assertEqual(json.loads((self.directory / "out" / "summary.json").read_text())["status"], "done")
+
+    def test_a_mesh_that_cannot_be_made_anew(self):
+        """The run ends with the state before it, whole on disk, and can go on from there."""
+        for program in PROGRAMS:
+            with self.subTest(program):
+                case = write_full_case(program, self.directory, 12)
+                whole, output = self.directory / f"{program}-whole", self.directory / f"{program}-failed"
+                code, said = finish(start(program, case, whole, ranks=RANKS))
+                self.assertEqual(code, 0, said)
+                environment = {**os.environ, "MALLEUS_FAIL_AT": "1:new_mesh:2:input"}
+                code, said = finish(start(program, case, output, ranks=RANKS, env=environment))
+                self.assertEqual(code, 3, said)
+                self.assertIn("the mesh cannot be made anew: a failure asked for by MALLEUS_FAIL_AT: rank 1, new_mesh 2", said)
+                self.assertIn("The last good state is that of increment", said)
+                code, said = finish(start(program, case, output, "--restart", ranks=RANKS))
+                self.assertEqual(code, 0, said)
+                self.assertEqual(digits(output), digits(whole))
 
 
 if __name__ == "__main__":

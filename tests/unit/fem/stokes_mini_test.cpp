@@ -233,7 +233,8 @@ TYPED_TEST(PlaneElement, SubscalesRestInHydrostaticEquilibrium) {
   ElementLoad<D> load;
   load.force.colwise() = force;
   const TypeParam element(points);
-  const auto balance = element.residual(unknowns, 2, 2).pressure - element.load(load, 2).pressure;
+  const Eigen::Matrix<Real, D + 1, 1> balance =
+      element.residual(unknowns, 2, 2).pressure - element.load(load, 2).pressure;
   EXPECT_LT(balance.norm(), 1e-14);
   EXPECT_LT(element.subscale_velocity(unknowns, load, 2).norm(), 1e-14);
   EXPECT_GT(element.load(load, 2).pressure.norm(), 1e-4);
