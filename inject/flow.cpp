@@ -112,6 +112,7 @@ void Flow::check_conditions() {
 }
 
 Outcome Flow::solve_once() {
+  state_.flow_updated = true;
   return is_solved_ && !is_asked_ ? Outcome::done() : solve(0, 0);
 }
 

@@ -247,8 +247,7 @@ std::vector<std::string> FillingProcess::error_columns() const {
 
 std::vector<HistoryCell> FillingProcess::history_row() {
   std::vector<HistoryCell> row = {filling_ ? filling_->fill_fraction() : 1, state_.injected,
-                                  filling_ ? filling_->volume_error() : 0,
-                                  flow_ ? (state_.flow_updated || state_.flow_solves == 1 ? 1 : 0) : 0};
+                                  filling_ ? filling_->volume_error() : 0, flow_ && state_.flow_updated ? 1 : 0};
   for (const GateState& gate : state_.gates) {
     row.push_back(flow_ ? HistoryCell(gate.pressure) : HistoryCell());
     row.push_back(gate.flow);
