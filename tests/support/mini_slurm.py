@@ -121,7 +121,7 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP OverSubscri
             state = self.state(job)
             if "PENDING" in state:
                 self.say("scontrol", "update", f"JobId={job}", "StartTime=now")
-            elif not {"RUNNING", "COMPLETING", "REQUEUED"} & set(state.split()):
+            elif not {"RUNNING", "SIGNALING", "COMPLETING", "REQUEUED"} & set(state.split()):
                 return state
             time.sleep(0.5)
         raise AssertionError(f"job {job} is {self.state(job)} after {seconds} s")
