@@ -122,7 +122,10 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP OverSubscri
             if "PENDING" in state:
                 self.say("scontrol", "update", f"JobId={job}", "StartTime=now")
             elif not {"RUNNING", "SIGNALING", "COMPLETING", "REQUEUED"} & set(state.split()):
-                return state
+                # A leg that goes back to the queue is told as failed for a moment.
+                time.sleep(3)
+                if self.state(job) == state:
+                    return state
             time.sleep(0.5)
         raise AssertionError(f"job {job} is {self.state(job)} after {seconds} s")
 
