@@ -10,6 +10,7 @@ import numpy as np
 
 from box_msh import BoxMesh
 from channel_case import AIR, CHANNEL, ETA, H, SLOPE, U, channel_mesh
+from filling import vortex
 from runs import history, run, summary
 
 
@@ -116,27 +117,7 @@ class Filling(unittest.TestCase):
         mesh = BoxMesh(2)
         mesh.add("box", [0.0, 0.0], [1.0, 1.0], [32, 32])
         mesh.write(self.directory / "box.msh")
-        text = """[mesh]
-file = box.msh
-[time]
-end = 2
-[fluid.polymer]
-viscosity = 1
-[fluid.air]
-viscosity = 1
-[initial]
-fluid = air
-[initial.disc]
-fluid = polymer
-shape = sphere
-center = 0.5 0.75
-radius = 0.15
-[flow]
-prescribed_x = "-sin(pi*x)^2*sin(2*pi*y)*cos(pi*t/2)"
-prescribed_y = "sin(pi*y)^2*sin(2*pi*x)*cos(pi*t/2)"
-[reference]
-level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
-"""
+        text = vortex(2) + "[mesh]\nfile = box.msh\n[time]\nend = 2\n"
         output = self.directory / "vortex"
         run("inject", self.case(text), output, ranks=2)
         self.assertEqual(summary(output)["components"].keys() & {"flow", "front", "filling"}, {"flow", "front", "filling"})

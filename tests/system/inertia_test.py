@@ -5,11 +5,9 @@ Phil. Trans. R. Soc. A 244 (1952) 312, columns twice as high as wide.
 """
 import csv
 import math
-import pathlib
-import tempfile
 import unittest
 
-from box_msh import BoxMesh
+from filling import Filling
 from runs import history, run, summary
 
 # y: velocity along the lid at x = 1/2, for Re 100 and 400
@@ -118,24 +116,7 @@ def started_in_pipe(time):
     return 1 - sum(32 / z ** 4 * math.exp(-(z / H) ** 2 * NU * time) for z in zeros)
 
 
-class Inertia(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.directory = pathlib.Path(scratch.name)
-
-    def box(self, name, size, cells):
-        mesh = BoxMesh(len(size))
-        mesh.add("cavity", [0.0] * len(size), size, cells)
-        mesh.write(self.directory / f"{name}.msh")
-
-    def solve(self, text, name="case", *options, ranks=1, check=True):
-        case = self.directory / f"{name}.ini"
-        case.write_text(text)
-        output = self.directory / f"out-{name}"
-        result = run("inject", case, output, *options, ranks=ranks, check=check)
-        return output if check else result
-
+class Inertia(Filling):
     def points(self, name, points):
         (self.directory / f"{name}.csv").write_text("x,y\n" + "".join(f"{x},{y}\n" for x, y in points))
 

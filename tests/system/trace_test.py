@@ -1,36 +1,20 @@
 """Fronts in flows that stay as they are, traced back along the stream ([front] transport = trace)."""
 import csv
 import math
-import pathlib
-import tempfile
 import unittest
 
-from box_msh import BoxMesh
 from channel_case import CHANNEL, H, U
+from filling import Filling, vortex
 from runs import history, run, summary
 
 ONCE = "[fluid.air]\nviscosity = 0.1\n[initial]\nfluid = air\n[flow]\nupdate = once\n[front]\ntransport = trace\n"
 PROBE = "[accuracy]\ntwo_meshes = no\n[probe.line]\nfile = line.csv\nfields = arrival_time\n"
 SLIPPING = CHANNEL.replace("[wall.lower]", "[wall.lower]\ncondition = slip").replace(
     "[wall.upper]", "[wall.upper]\ncondition = slip")
-VORTEX = """[mesh]
+VORTEX = vortex(8) + """[mesh]
 file = square.msh
-[fluid.polymer]
-viscosity = 1
-[fluid.air]
-viscosity = 1
-[initial]
-fluid = air
-[initial.disc]
-fluid = polymer
-shape = sphere
-center = 0.5 0.75
-radius = 0.15
 [front]
 transport = trace
-[flow]
-prescribed_x = "-sin(pi*x)^2*sin(2*pi*y)*cos(pi*t/8)"
-prescribed_y = "sin(pi*y)^2*sin(2*pi*x)*cos(pi*t/8)"
 [accuracy]
 two_meshes = no
 [time]
@@ -38,29 +22,10 @@ step = 2
 end = 8
 [output]
 every = 100
-[reference]
-level_set = "0.15 - sqrt((x-0.5)^2 + (y-0.75)^2)"
 """
 
 
-class Trace(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.directory = pathlib.Path(scratch.name)
-
-    def box(self, name, size, cells):
-        mesh = BoxMesh(len(size))
-        mesh.add("cavity", [0.0] * len(size), size, cells)
-        mesh.write(self.directory / f"{name}.msh")
-
-    def solve(self, text, name="case", *options, ranks=1, check=True):
-        case = self.directory / f"{name}.ini"
-        case.write_text(text)
-        output = self.directory / f"out-{name}"
-        result = run("inject", case, output, *options, ranks=ranks, check=check)
-        return output if check else result
-
+class Trace(Filling):
     def points(self, points):
         axes = "xyz"[:len(points[0])]
         (self.directory / "line.csv").write_text(
