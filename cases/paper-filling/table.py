@@ -26,6 +26,7 @@ def measure(run, row):
     step = components["front"]["wall_s"]["max"] * ranks / steps
     a_node = run.summary["peak_memory_bytes"] / last["nodes"]
     growth = PAPER["nodes"] / last["nodes"]
-    hours = growth * (solve * solves * (1 if solves == 1 else PAPER["steps"] / steps) + PAPER["steps"] * step) / 3600
+    wanted = steps if "front.transport=trace" in row["set"] else PAPER["steps"]  # a trace needs no steps
+    hours = growth * (solve * solves * (1 if solves == 1 else wanted / steps) + wanted * step) / 3600
     return [f"{last['nodes']:.0f}", str(solves), f"{solve:.1f}", str(steps), f"{1e6 * step / last['nodes']:.2f}", f"{a_node:.0f}",
             f"{hours:.1f}", f"{a_node * PAPER['nodes'] / 2 ** 30:.0f}"]
