@@ -67,8 +67,7 @@ bool Operators<D, Metric>::optimise(LocalId v) {
 /// Stars the shell of an inner edge from a new point near its middle where that betters its worst key.
 template <int D, class Metric>
 bool Operators<D, Metric>::insert_at(LocalId e, std::size_t edge) {
-  const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
-  const LocalId b = mesh_.element(e).node[EdgeTable<D>::nodes[edge][1]];
+  const auto [a, b] = mesh_.ends(e, edge);
   if (!cavity_.gather_shell(e, edge) || !cavity_.is_closed() || cavity_.has_inner_patch()) return false;
   const Real old = cavity_.worst_key();
   if (old <= 0) return false;

@@ -117,8 +117,7 @@ bool Operators<D, Metric>::split_at(StarOf star, EntityOf entity, LocalId a, Loc
 
 template <int D, class Metric>
 bool Operators<D, Metric>::split(LocalId e, std::size_t edge) {
-  const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
-  const LocalId b = mesh_.element(e).node[EdgeTable<D>::nodes[edge][1]];
+  const auto [a, b] = mesh_.ends(e, edge);
   if (!cavity_.gather_shell(e, edge)) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0) return false;

@@ -151,8 +151,7 @@ bool Operators<D, Metric>::swap_inner_edge(LocalId a, LocalId b, Real worst) {
 
 template <int D, class Metric>
 bool Operators<D, Metric>::swap_edge(LocalId e, std::size_t edge) {
-  const LocalId a = mesh_.element(e).node[EdgeTable<D>::nodes[edge][0]];
-  const LocalId b = mesh_.element(e).node[EdgeTable<D>::nodes[edge][1]];
+  const auto [a, b] = mesh_.ends(e, edge);
   const bool both_on_boundary = mesh_.vertex(a).dimension < D && mesh_.vertex(b).dimension < D;
   if (both_on_boundary && mesh_.curve_of(a, b) >= 0) return false;
   if (!cavity_.gather_shell(e, edge) || cavity_.ring().size() > largest_ring) return false;

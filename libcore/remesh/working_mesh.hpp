@@ -113,6 +113,11 @@ struct WorkingMesh {
 
   const Element<D>& element(LocalId e) const { return elements[static_cast<std::size_t>(e)]; }
   Element<D>& element(LocalId e) { return elements[static_cast<std::size_t>(e)]; }
+  /// Vertices of an edge of an element, edge in the order of EdgeTable. Local.
+  std::array<LocalId, 2> ends(LocalId e, std::size_t edge) const {
+    const auto& [i, j] = EdgeTable<D>::nodes[edge];
+    return {element(e).node[i], element(e).node[j]};
+  }
   const Point<D>& point(LocalId v) const { return points[static_cast<std::size_t>(v)]; }
   Point<D>& point(LocalId v) { return points[static_cast<std::size_t>(v)]; }
   const Metric& metric(LocalId v) const { return metrics[static_cast<std::size_t>(v)]; }
