@@ -361,6 +361,8 @@ MeditMesh read_medit(const fs::path& path) {
   check_nodes(path, mesh.corners, mesh.nodes(), "a corner");
   check_nodes(path, mesh.ridges, static_cast<LocalId>(mesh.edge_reference.size()), "a ridge");
   if (mesh.coordinates.empty()) throw InputError(fmt::format("{}: no vertices", path.string()));
+  if (mesh.dimension == 2 && !mesh.tetrahedra.empty())
+    throw InputError(fmt::format("{}: tetrahedra in a file of Dimension 2", path.string()));
   return mesh;
 }
 
@@ -369,7 +371,11 @@ MeditSolution read_medit_solution(const fs::path& path) {
   MeditSolution solution;
   solution.components = 0;
   for (int code = source->next_section(); code != end_code; code = source->next_section()) {
-    if (code == 3) set_dimension(*source, path, solution.dimension);
+    if (code == 3) {
+      if (solution.components != 0)
+        throw InputError(fmt::format("{}: Dimension comes after SolAtVertices", path.string()));
+      set_dimension(*source, path, solution.dimension);
+    }
     if (code != solution_code) continue;
     const std::size_t n = checked_count(*source, path);
     const int fields = small_integer(*source);

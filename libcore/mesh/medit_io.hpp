@@ -38,7 +38,8 @@ struct MeditSolution {
 
 /// The ending decides between ASCII (.mesh, .sol) and binary (.meshb, .solb; versions 1 to 4, of this machine's byte
 /// order). Sections that are not simplices or their marks are skipped. InputError where the file is missing, cut off,
-/// names nodes that it does not have, or (solutions) holds anything but one scalar or tensor per node.
+/// names nodes that it does not have, has tetrahedra in a plane, or (solutions) holds anything but one scalar or tensor
+/// per node.
 MeditMesh read_medit(const std::filesystem::path& path);
 MeditSolution read_medit_solution(const std::filesystem::path& path);
 

@@ -67,6 +67,14 @@ TEST(MeditMesh, ReferencesOfZeroAreNoGroups) {
   EXPECT_EQ(world().sum(named), 1);
 }
 
+TEST(MeditMesh, TetrahedraInAPlaneAreAnInputError) {
+  const test::ScratchDirectory scratch;
+  const std::string path = put_file(scratch, "flat.mesh",
+                                    "MeshVersionFormatted 2\nDimension 2\nVertices\n4\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
+                                    "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
+  EXPECT_THROW(read_medit_mesh(world(), path), InputError);
+}
+
 TEST(MeditMesh, AMissingFileIsAnInputErrorOnAllRanks) {
   try {
     read_medit_mesh(world(), "/nonexistent/a.mesh");
