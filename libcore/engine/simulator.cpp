@@ -231,15 +231,17 @@ int run_case(const Communicator& comm, const CommandLine& line, Simulator& simul
 
 }  // namespace
 
+int answer(const Communicator& comm, Simulator& simulator, const std::vector<std::string>& arguments) {
+  const CommandLine line = parse_command_line(simulator.program(), simulator.description(), arguments);
+  log::start(comm.is_root(), line.quiet ? log::Level::quiet : line.verbose ? log::Level::verbose : log::Level::normal);
+  if (answer_questions(comm, line, simulator)) return exit_code::done;
+  return run_case(comm, line, simulator);
+}
+
 int run_simulator(int argc, char** argv, Simulator& simulator) {
   return run_guarded(argc, argv, [&](const Communicator& comm, const std::vector<std::string>& arguments) {
     listen_for_stop_signals();
-    const CommandLine line = parse_command_line(simulator.program(), simulator.description(), arguments);
-    log::start(comm.is_root(), line.quiet     ? log::Level::quiet
-                               : line.verbose ? log::Level::verbose
-                                              : log::Level::normal);
-    if (answer_questions(comm, line, simulator)) return exit_code::done;
-    return run_case(comm, line, simulator);
+    return answer(comm, simulator, arguments);
   });
 }
 

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "case/common_sections.hpp"
 #include "case/schema.hpp"
@@ -27,6 +28,10 @@ class Simulator {
   /// check_mesh() again, or throw InputError. Collective.
   virtual std::unique_ptr<Process> assemble(const Communicator& comm, Mesh mesh, CaseReader& reader) = 0;
 };
+
+/// What a simulator does between the start and the end of MPI and PETSc; the exit code. May be called again. Throws the
+/// errors that end a program. Collective.
+int answer(const Communicator& comm, Simulator& simulator, const std::vector<std::string>& arguments);
 
 /// main() of a simulator: see the options in --help. Returns the exit code.
 int run_simulator(int argc, char** argv, Simulator& simulator);

@@ -257,3 +257,41 @@ class Checker:
             return f"{program} worked for {seconds:.0f} s on {ranks} ranks:\n{text}"
         left = sorted(path.name for path in self.directory.iterdir() if path.name not in ("case.ini", "square.msh"))
         return f"{program} --check wrote {left}:\n{text}" if left else None
+
+
+class Batch:
+    """Mutants of consecutive numbers that one process answers, a file each."""
+
+    def __init__(self, directory, mesh, program, seed, numbers):
+        self.directory, self.program, self.numbers = pathlib.Path(directory), program, numbers
+        self.reached = numbers.start  # the first that was not asked
+        self.is_wrong = {}
+        (self.directory / "square.msh").write_text(mesh)
+        for number in numbers:
+            text, self.is_wrong[number] = mutant(program, seed, number)
+            self.path(number).write_bytes(text.encode("latin-1"))
+
+    def path(self, number):
+        return self.directory / f"{number}.ini"
+
+    def judge(self, ranks, answers):
+        """Asks as many as the process lives to answer; number -> what is wrong with the answer."""
+        before = sorted(self.directory.iterdir())
+        words = [*LAUNCH, ranks, BIN.parent / "tests" / "check_cases", self.program, self.directory, self.numbers.start, self.numbers.stop]
+        ended = subprocess.run([str(word) for word in words], capture_output=True, cwd=self.directory)
+        wrong = {}
+        for line in ended.stdout.decode("latin-1").split("\n")[:-1]:
+            number, code, said = line.split(" ", 2)
+            if int(number) != self.reached:
+                raise AssertionError(f"mutant {self.reached} is passed over: {line}")
+            answers.add(int(code), 0.0)
+            if int(code) not in (0, 2) or (self.is_wrong[self.reached] and int(code) != 2) or (int(code) == 2 and not said.strip()):
+                wrong[self.reached] = f"answered with {code}: {said}\n{self.path(number).read_text(errors='replace')}"
+            self.reached += 1
+        if ended.returncode != 0 or self.reached == self.numbers.start:
+            number = self.reached
+            wrong[number] = f"ended with {ended.returncode}: {ended.stderr.decode('latin-1')}\n{self.path(number).read_text(errors='replace')}"
+            self.reached += 1
+        if sorted(self.directory.iterdir()) != before:
+            wrong[self.numbers.start] = f"the batch wrote {set(self.directory.iterdir()) - set(before)}"
+        return wrong

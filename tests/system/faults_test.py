@@ -13,8 +13,7 @@ import time
 import unittest
 
 import long_runs
-from long_runs import (PROGRAMS, check_sound, digits, finish, kill, rows_so_far, start, wait_for_rows, wait_for_writing,
-                       write_case, write_full_case)
+from long_runs import (PROGRAMS, check_sound, digits, finish, kill, rows_so_far, start, wait_for_rows, wait_for_writing, write_case)
 
 JUMPING_CLOCK = r"""
 #include <stdlib.h>
@@ -92,23 +91,6 @@ class Kills(LongRuns):
                 self.assert_same_digits(self.run_to_end(program, case, output.name, "--restart", ranks=2), whole)
                 other = self.run_to_end(program, case, f"{program}-elsewhere", "--restart", ranks=3)
                 self.assert_near(other, whole)
-
-    def test_heat_tracers_and_remeshing_go_on_to_the_same_digits(self):
-        for program in PROGRAMS:
-            with self.subTest(program):
-                case = write_full_case(program, self.directory, 12)
-                whole = self.run_to_end(program, case, f"{program}-whole", ranks=2)
-                parts = self.directory / f"{program}-parts"
-                code, said = finish(start(program, case, parts, "--steps", "5", ranks=2))
-                self.assertEqual(code, 0, said)
-                self.run_to_end(program, case, parts.name, "--restart", ranks=2)
-                self.assert_same_digits(parts, whole)
-                probes = [(output / "probe-middle.csv").read_text() for output in (whole, parts)]
-                self.assertGreater(probes[0].count("\n"), 12)
-                self.assertEqual(*probes)
-                if program == "forge":
-                    temperatures = [float(row[digits(whole)[0].index("temperature_billet_K")]) for row in digits(whole)[1:]]
-                    self.assertGreater(temperatures[-1], temperatures[0])
 
     def test_checkpoints_change_no_digit(self):
         for program in PROGRAMS:
@@ -248,6 +230,49 @@ class Disks(LongRuns):
                     code, said = finish(start(program, case, place / "out", ranks=ranks))
                     self.assertEqual(code, 4, said)
                     self.assertIn("No space left on device", said)
+
+    def test_a_directory_that_vanishes(self):
+        for program, ranks in zip(PROGRAMS, (1, 2)):
+            with self.subTest(program):
+                case = write_case(program, self.directory, 400)
+                output = self.directory / f"{program}-out"
+                process = start(program, case, output, ranks=ranks)
+                self.assertTrue(wait_for_rows(process, output, 4))
+                os.rename(output, self.directory / f"{program}-gone")
+                code, said = finish(process, 60)
+                self.assertEqual(code, 4, said)
+                self.assertIn(f"{output.name}", said)
+
+    def test_a_directory_that_may_no_longer_be_written(self):
+        case = write_case("forge", self.directory, self.INCREMENTS)
+        whole = self.run_to_end("forge", case, "whole", ranks=2)
+        place = self.directory / "disk"
+        place.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "tmpfs", place], capture_output=True).returncode != 0:
+            self.skipTest("no file system can be mounted here")
+        self.addCleanup(subprocess.run, ["umount", place], check=True)
+        code, said = finish(start("forge", case, place / "out", "--steps", "5", ranks=2))
+        self.assertEqual(code, 0, said)
+        subprocess.run(["mount", "-o", "remount,ro", place], check=True)
+        code, said = finish(start("forge", case, place / "out", "--restart", ranks=2))
+        self.assertEqual(code, 4, said)
+        self.assertIn("Read-only file system", said)
+        subprocess.run(["mount", "-o", "remount,rw", place], check=True)
+        self.assert_same_digits(self.run_to_end("forge", case, place / "out", "--restart", ranks=2), whole)
+
+    def test_files_that_may_grow_no_more(self):
+        for program, ranks in zip(PROGRAMS, (2, 1)):
+            with self.subTest(program):
+                case = write_case(program, self.directory, 400)
+                output = self.directory / f"{program}-limited"
+                process = start(program, case, output, ranks=ranks)
+                self.assertTrue(wait_for_rows(process, output, 4))
+                for rank in long_runs.ranks_of(process, program):
+                    resource.prlimit(rank, resource.RLIMIT_FSIZE, (4096, 4096))
+                code, said = finish(process, 60)
+                self.assertEqual(code, 4, said)
+                self.assertIn("File too large", said)
+                self.assertTrue(any((output / "checkpoints").iterdir()))
 
     def test_a_place_where_nothing_can_be_made(self):
         case = write_case("forge", self.directory, self.INCREMENTS)

@@ -8,7 +8,7 @@ import math
 import unittest
 
 from filling import Filling
-from runs import history, run, summary
+from runs import history, summary
 
 # y: velocity along the lid at x = 1/2, for Re 100 and 400
 GHIA = {0.0547: (-0.03717, -0.08186), 0.1016: (-0.06434, -0.14612), 0.1719: (-0.10150, -0.24299), 0.2813: (-0.15662, -0.32726),
@@ -175,14 +175,6 @@ class Inertia(Filling):
                 self.assertGreater(time, known - 0.45)
             self.assertLess(max(abs(row["volume_error"]) for row in history(output)), 1e-9)
             self.assertEqual(summary(output)["status"], "done")
-
-    def test_a_restart_goes_on_as_if_there_had_been_none(self):
-        self.box("channel", [1.0, H], [4, 8])
-        whole = history(self.solve(START + "step = 1\nend = 6\n", "whole"))
-        output = self.solve(START + "step = 1\nend = 6\n", "parts", "--steps", "3")
-        run("inject", self.directory / "parts.ini", output, "--restart")
-        for a, b in zip(whole, history(output)):
-            self.assertEqual(a["flow_gate_m3_s"], b["flow_gate_m3_s"])
 
     def test_what_inertia_needs_is_asked_for(self):
         self.box("channel", [1.0, H], [4, 4])

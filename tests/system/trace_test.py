@@ -5,7 +5,7 @@ import unittest
 
 from channel_case import CHANNEL, H, U
 from filling import Filling, vortex
-from runs import history, run, summary
+from runs import history, summary
 
 ONCE = "[fluid.air]\nviscosity = 0.1\n[initial]\nfluid = air\n[flow]\nupdate = once\n[front]\ntransport = trace\n"
 PROBE = "[accuracy]\ntwo_meshes = no\n[probe.line]\nfile = line.csv\nfields = arrival_time\n"
@@ -93,15 +93,6 @@ class Trace(Filling):
             result = self.solve(wrong, name, check=False)
             self.assertEqual(result.returncode, 2, name)
             self.assertIn("trace", result.stderr)
-
-    def test_a_restart_goes_on_with_the_same_times(self):
-        self.box("channel", [4 * H, H], [32, 8])
-        text = CHANNEL + ONCE + "[time]\nstep = 0.05\nend = 0.4\n"
-        whole = history(self.solve(text, "whole"))
-        output = self.solve(text, "parts", "--steps", "3")
-        run("inject", self.directory / "parts.ini", output, "--restart")
-        for a, b in zip(whole, history(output)):
-            self.assertEqual(a["fill_fraction"], b["fill_fraction"])
 
 
 if __name__ == "__main__":
