@@ -464,6 +464,7 @@ NewtonOutcome ContactFlow::run_newton_once(const NewtonOptions& asked) {
   if (is_cold_) options.start_shear_rate = std::sqrt(3.0) * scene_.scale.rate();
   const NewtonOutcome outcome = NewtonSolver(options).solve(*operator_, linear_, state_);
   report_.newton_iterations += outcome.iterations();
+  report_.residual = outcome.residual;
   is_cold_ = is_cold_ && !outcome.converged;
   is_transferred_ = is_transferred_ && !outcome.converged;
   totals_.linear_solves += outcome.linear_solves;

@@ -29,6 +29,8 @@ struct FlowReport {
   WorkBalance power;
   Real force_imbalance = 0;  ///< sum of the forces that are left over, relative to the largest one
   Real max_penetration = 0;  ///< m, at the end of the increment as the conditions see it
+  Real penalty_power = 0;    ///< W, of the contact pressures on what they let through
+  Real residual = 0;         ///< relative, that the last nonlinear solve ended with
   int contacts = 0;          ///< active contact points
 };
 

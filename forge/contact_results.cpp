@@ -237,13 +237,14 @@ void ContactFlow::measure_forces() {
 void ContactFlow::measure_powers(std::span<const Real> reactions) {
   const auto dim = static_cast<std::size_t>(scene_.dim());
   const std::size_t opponents = scene_.tools.size() + scene_.pairs.size();
-  std::vector<Real> sums(opponents + 3, 0.0);  // areas; powers imposed, of tools, of contacts
+  std::vector<Real> sums(opponents + 4, 0.0);  // areas; powers imposed, of tools, of contacts, of penalties
   for (std::size_t i = 0; i < contact_.points().size(); ++i) {
     const ContactPoint& point = contact_.points()[i];
     const ContactTraction& traction = tractions_[i];
     if (traction.pressure > 0) sums[static_cast<std::size_t>(point.opponent)] += point.area;
     sums[opponents + 1] += point.area * traction.traction.dot(point.opponent_velocity);
     sums[opponents + 2] -= point.area * traction.traction.dot(slips_[i]);
+    sums[opponents + 3] += point.area * traction.pressure * point.normal.normal.dot(slips_[i]);
   }
   for (LocalId node = 0; node < scene_.mesh.owned_nodes() && scene_.progress.was_pushed; ++node) {
     sums[opponents] +=
@@ -254,6 +255,7 @@ void ContactFlow::measure_powers(std::span<const Real> reactions) {
   report_.power.imposed = sums[opponents];
   report_.power.tools = sums[opponents + 1];
   report_.power.contact = sums[opponents + 2];
+  report_.penalty_power = sums[opponents + 3];
   report_.power.deformation = 0;
   if (!scene_.progress.was_pushed) return;
   operator_->update_viscosity(state_);

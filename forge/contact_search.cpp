@@ -68,6 +68,7 @@ ContactPoint make_point(const ContactScene& scene, std::size_t place, int oppone
   point.holds =
       memory != nullptr || meeting.gap <= touching * body.edge || held_before(scene, point.slave, meeting.gap);
   point.rubs = point.holds;
+  if (point.holds && !scene.settings.closes_gaps) point.normal.offset = 0;
   return point;
 }
 

@@ -33,6 +33,7 @@ struct ContactSettings {
   Real slip_scale = 0;  ///< regularisation of friction, m/s
   Real holding_friction =
       0;  ///< where friction is 0 and the slave is not held: f K of linear friction = this x viscosity/edge
+  bool closes_gaps = true;  ///< false: what holds keeps the gap or overlap that it has
 };
 
 /// Where the nodes are expected at the end of the increment, if they go with the guessed velocity.

@@ -3,7 +3,7 @@
 /// Where the error of a forging run's forces comes from.
 
 #include "engine/error_budget.hpp"
-#include "forge/scene.hpp"
+#include "forge/increment_errors.hpp"
 
 namespace malleus::forge {
 
@@ -11,15 +11,16 @@ namespace malleus::forge {
 struct RunMeasures {
   Real largest_strain_step = 0;  ///< mean strain of the deformable bodies in one increment, the largest
   Real volume_change = 0;        ///< relative
-  Real force_imbalance = 0;      ///< relative to the largest force
+  Real raw_volume_drift = 0;     ///< relative: what the motion alone would have lost
+  ForceErrors forces;            ///< root mean squares over the increments
   Real max_penetration = 0;      ///< m
   Real travel = 0;               ///< m, of the fastest tool or boundary
   bool gives_step = false;       ///< [time] step is given: it rules the steps
 };
 
-/// Sources other than space. The factors are those measured on friction rings and upsettings by independent solvers:
-/// time 1.2 (Adams-Bashforth 2) or 0.4 (Runge-Kutta 2) times the square of a step's strain, 0.3 times the strain
-/// (Euler); contact 0.1/c; cut-off 0.6 times its square; nonlinear tolerance a half. Local.
+/// Sources other than space. Time: the flow that gives the lost volume back, and half of that loss over the run, which
+/// tells how the scheme's errors add up in the shape (Euler: 0.3 times a step's strain, as measured on friction rings
+/// and upsettings by independent solvers). Nonlinear: half of the residual reached. Local.
 ErrorBudget forge_error_budget(const Scene& scene, const RunMeasures& run);
 
 }  // namespace malleus::forge

@@ -442,6 +442,7 @@ Real ForgeProcess::mean_strain_rate() const {
 /// What an increment adds to the sums of the run.
 void ForgeProcess::sum_up_increment() {
   const Real dt = scene_->progress.time - last_time_;
+  if (dt > 0 && scene_->progress.was_pushed) force_errors_.add(increment_errors(*scene_, flow_.report(), dt));
   last_time_ = scene_->progress.time;
   const WorkBalance& power = flow_.report().power;
   work_.imposed += dt * power.imposed;
@@ -452,11 +453,19 @@ void ForgeProcess::sum_up_increment() {
   folds_.look(scene_->progress.time, flow_.touching());
 }
 
+/// Penalties go with 1/size: those of the other mesh.
+void ForgeProcess::stand_as_it_is(Real size_ratio) {
+  scene_->contact.penalty *= size_ratio;
+  scene_->contact.closes_gaps = false;
+  scene_->motion.volume_target = VolumeTarget::no;
+}
+
 ErrorBudget ForgeProcess::error_budget() {
   RunMeasures run;
   run.largest_strain_step = largest_strain_step_;
   run.volume_change = volume_change();
-  run.force_imbalance = max_imbalance_;
+  run.raw_volume_drift = scene_->progress.raw_volume_drift;
+  run.forces = force_errors_.mean();
   run.max_penetration = max_penetration_;
   run.travel = std::max(leading_stroke().value_or(0), scene_->scale.speed * scene_->progress.time);
   run.gives_step = case_.time.step.has_value();
@@ -541,6 +550,7 @@ nlohmann::json ForgeProcess::save_state() const {
   state["work"] = work_json(work_);
   state["folds"] = folds_.save();
   state["largest_strain_step"] = largest_strain_step_;
+  state["force_errors"] = force_errors_.save();
   for (const Body& body : scene_->bodies) state["start_volumes"].push_back(body.start_volume);
   for (const Tool& tool : scene_->tools) state["presses"].push_back(press_json(tool.press().state()));
   return state;
@@ -573,6 +583,7 @@ void ForgeProcess::restore(Mesh&& mesh, std::vector<std::pair<FieldSpec, std::ve
   work_ = work_of(state.at("work"));
   folds_.restore(state.at("folds"));
   largest_strain_step_ = state.at("largest_strain_step");
+  force_errors_.restore(state.at("force_errors"));
   last_time_ = progress.time;
   if (heat_ && state.contains("heat")) heat_->set_totals(heat_totals(state.at("heat")));
   if (rebalancing_ && state.contains("balance")) rebalancing_->restore(state.at("balance"));

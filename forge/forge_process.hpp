@@ -9,6 +9,7 @@
 #include "engine/remeshing.hpp"
 #include "forge/folds.hpp"
 #include "forge/heat.hpp"
+#include "forge/increment_errors.hpp"
 #include "forge/known_errors.hpp"
 #include "forge/motion.hpp"
 
@@ -43,6 +44,7 @@ class ForgeProcess final : public Process {
   nlohmann::json accuracy() override;
   std::vector<std::string> closing_lines() override;
   ErrorBudget error_budget() override;
+  void stand_as_it_is(Real size_ratio) override;
   nlohmann::json save_state() const override;
   std::vector<Real> save_local() const override { return flow_.save_memory(); }
   void restore_local(std::span<const Real> saved) override { flow_.restore_memory(saved); }
@@ -90,6 +92,7 @@ class ForgeProcess final : public Process {
   int at_rest_ = 0;           ///< increments since it last advanced
   Real max_penetration_ = 0;  ///< of the run, m
   Real max_imbalance_ = 0;
+  ForceErrorSums force_errors_;
   Real largest_strain_step_ = 0;  ///< mean over the bodies
   Real last_time_ = 0;            ///< s, of the last row
   WorkBalance work_;              ///< J, of the run

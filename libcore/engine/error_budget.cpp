@@ -25,9 +25,9 @@ void ErrorBudget::add(ErrorShare share) {
 }
 
 Real ErrorBudget::total() const {
-  Real sum = 0;
-  for (const ErrorShare& share : shares_) sum += share.relative;
-  return sum;
+  Real squares = 0;
+  for (const ErrorShare& share : shares_) squares += share.relative * share.relative;
+  return std::sqrt(squares);
 }
 
 std::vector<std::string> ErrorBudget::lines() const {

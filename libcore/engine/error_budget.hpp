@@ -29,7 +29,7 @@ class ErrorBudget {
   bool empty() const noexcept { return shares_.empty(); }
   /// From the largest to the smallest.
   const std::vector<ErrorShare>& shares() const noexcept { return shares_; }
-  /// The sum of the shares: a bound as far as each is one, for sources may cancel but need not. 0 if there are none.
+  /// The root of the sum of squares: what sources that know nothing of each other leave together. 0 if there are none.
   Real total() const;
   /// A line of the total, one a source, and one that names the knob to turn first. Empty if there are no sources.
   std::vector<std::string> lines() const;

@@ -86,6 +86,11 @@ class Process {
   virtual std::vector<Real> results() { return {}; }
   /// Before an increment whose results() will be compared: all of it is solved anew, nothing kept from earlier ones.
   virtual void solve_all_next() {}
+  /// On a mesh made anew, ahead of an increment that is compared with that of another mesh: what steps give back
+  /// (volume lost before, gaps of surfaces that touch) belongs to the other mesh, and is left out from now on.
+  /// size_ratio: its sizes over those of the other mesh; what goes with sizes but is no error of space stays as it is
+  /// there.
+  virtual void stand_as_it_is(Real /*size_ratio*/) {}
   /// Whether results() change in the course of the run beyond what the first increment tells of the mesh.
   virtual bool solves_again() const { return true; }
   /// Whether a mesh of half the sizes takes twice as many increments.

@@ -1,8 +1,10 @@
 #include "engine/space_estimate.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/error.hpp"
@@ -13,12 +15,12 @@
 namespace malleus {
 namespace {
 
-constexpr Real coarsening = 2;           ///< of sizes, from one mesh to the next
-constexpr Real least_ratio = 1.2;        ///< of mean sizes: below it two meshes do not tell apart
-constexpr GlobalId fewest_elements = 8;  ///< of a mesh that says something
-constexpr Real lowest_order = 1;
-constexpr Real highest_order = 4;
-constexpr Real theoretical_order = 2;
+/// Of sizes, from one mesh to the next: twice and three times the finest. Larger steps leave the range in which errors
+/// follow a power of the size, shorter ones show little but chance.
+constexpr std::array<Real, 2> coarsenings = {2, 1.5};
+constexpr Real least_ratio = 1.2;  ///< of mean sizes: below it two meshes do not tell apart
+constexpr std::array<GlobalId, 4> fewest_elements = {0, 0, 8, 30};  ///< [dimension] of a mesh that says something
+constexpr Real usual_order = 1.75;
 constexpr Real growth_of_time = 1.1;  ///< of an increment's time with the number of elements, as an exponent
 
 Real size_ratio(const Mesh& fine, const Mesh& coarse) {
@@ -51,19 +53,9 @@ std::vector<std::pair<FieldSpec, std::vector<Real>>> taken_from(const FieldStore
 
 }  // namespace
 
-Real observed_order(const MeshComparison& comparison) {
-  if (!comparison.difference2 || !(comparison.first_difference > 0)) return theoretical_order;
-  const Real growth = *comparison.difference2 / comparison.first_difference;
-  if (growth <= 1) return theoretical_order;  // too coarse for an order to show
-  return std::clamp(std::log(growth) / std::log(comparison.second_ratio), lowest_order, highest_order);
-}
-
-Real extrapolated_error(const MeshComparison& comparison) {
-  return comparison.first_difference / (std::pow(comparison.first_ratio, observed_order(comparison)) - 1);
-}
-
-/// The fine process' state on a mesh of about twice the sizes; null where there is none.
-std::unique_ptr<Process> SpaceEstimate::coarser(const Process& fine, FieldStore& fine_fields) const {
+/// The fine process' state on a mesh of about so many times the sizes; null where there is none.
+std::unique_ptr<Process> SpaceEstimate::coarser(const Process& finest, const Process& fine, FieldStore& fine_fields,
+                                                Real coarsening) const {
   Mesh mesh = fine.mesh();
   FieldStore fields = copy_of(mesh, fine_fields);
   std::vector<Real> sizes = current_sizes(comm_, mesh).values();
@@ -71,10 +63,13 @@ std::unique_ptr<Process> SpaceEstimate::coarser(const Process& fine, FieldStore&
   DistributedRemeshOptions options;
   options.local.keep_volume = true;
   remesh_distributed(comm_, mesh, fields, Metric::per_node(std::move(sizes)), options);
-  if (mesh.total_elements < fewest_elements || size_ratio(fine.mesh(), mesh) < least_ratio) return nullptr;
+  if (mesh.total_elements < fewest_elements[static_cast<std::size_t>(mesh.dim)] ||
+      size_ratio(fine.mesh(), mesh) < least_ratio)
+    return nullptr;
   std::unique_ptr<Process> twin = factory_(mesh);
   twin->restore(std::move(mesh), taken_from(fields), fine.save_state());
   twin->solve_all_next();
+  twin->stand_as_it_is(size_ratio(finest.mesh(), twin->mesh()));
   return twin;
 }
 
@@ -83,9 +78,14 @@ void SpaceEstimate::prepare(Process& process) {
   if (!factory_) return;
   const log::Silence silence;
   try {
-    if (auto twin = coarser(process, process.fields())) twins_.push_back(std::move(twin));
-    if (twins_.empty()) return;
-    if (auto twin = coarser(*twins_.front(), twins_.front()->fields())) twins_.push_back(std::move(twin));
+    const Process* finer = &process;
+    FieldStore* fields = &process.fields();
+    for (const Real coarsening : coarsenings) {
+      auto twin = coarser(process, *finer, *fields, coarsening);
+      if (!twin) return;
+      finer = twins_.emplace_back(std::move(twin)).get();
+      fields = &twins_.back()->fields();
+    }
   } catch (const InputError&) {  // a scene that cannot be set up on a mesh that coarse: fewer meshes are compared
   } catch (const NumericsError&) {
   }
@@ -113,25 +113,22 @@ void SpaceEstimate::compare(Process& process, const std::optional<Increment>& in
   const std::vector<Real> fine = process.results();
   Real scale = 0;
   for (const Real result : fine) scale += std::abs(result);
-  std::vector<std::vector<Real>> coarse;
+  MeshComparison comparison = {{1}, {fine}};
   for (const auto& twin : twins_) {
     auto results = results_of(*twin, increment);
     if (!results || results->size() != fine.size()) break;
-    coarse.push_back(std::move(*results));
+    comparison.sizes.push_back(size_ratio(process.mesh(), twin->mesh()));
+    comparison.results.push_back(std::move(*results));
+    log::debug("estimate on {} nodes, {:.3g} times the sizes: {:.6g}; on {}: {:.6g}", twin->mesh().total_nodes(),
+               comparison.sizes.back(), fmt::join(comparison.results.back(), ", "), process.mesh().total_nodes(),
+               fmt::join(fine, ", "));
   }
-  if (!coarse.empty() && scale > 0) {
-    MeshComparison comparison;
-    comparison.first_ratio = size_ratio(process.mesh(), twins_[0]->mesh());
-    comparison.first_difference = difference(fine, coarse[0], scale);
-    if (coarse.size() > 1) {
-      comparison.difference2 = difference(coarse[0], coarse[1], scale);
-      comparison.second_ratio = size_ratio(twins_[0]->mesh(), twins_[1]->mesh());
-    }
+  if (comparison.sizes.size() > 1 && scale > 0) {
     const Real error = extrapolated_error(comparison);
     if (std::isfinite(error)) {
       saved_ = {{"error", error},
                 {"order", observed_order(comparison)},
-                {"meshes", coarse.size() + 1},
+                {"meshes", comparison.sizes.size()},
                 {"dimension", process.mesh().dim}};
     }
   }
@@ -155,13 +152,13 @@ std::optional<Outlook> SpaceEstimate::look_ahead(const Process& process, Real la
     const Real ratio = size_ratio(process.mesh(), twins_[0]->mesh());
     outlook =
         Outlook{seconds[0] * std::pow(static_cast<Real>(process.mesh().total_elements) / elements[0], growth_of_time),
-                0, theoretical_order};
+                0, usual_order};
     Real scale = 0;
     for (const Real result : results[0]) scale += std::abs(result);
     if (results.size() > 1 && results[1].size() == results[0].size() && scale > 0) {
       const Real second_ratio = size_ratio(twins_[0]->mesh(), twins_[1]->mesh());
-      const Real of_twin = difference(results[0], results[1], scale) / (std::pow(second_ratio, theoretical_order) - 1);
-      outlook->error = of_twin / std::pow(ratio, theoretical_order);
+      const Real of_twin = difference(results[0], results[1], scale) / (std::pow(second_ratio, usual_order) - 1);
+      outlook->error = of_twin / std::pow(ratio, usual_order);
     }
   }
   twins_.clear();

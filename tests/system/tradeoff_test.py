@@ -40,17 +40,23 @@ class Folder(unittest.TestCase):
 
 
 class Budget(Folder):
-    def test_the_estimated_error_bounds_that_of_the_gate_and_is_of_its_size(self):
-        for across in (6, 8, 12):
-            self.mesh(across)
-            for ranks in (1, 3):
-                with self.subTest(across=across, ranks=ranks):
-                    log, summary = self.fill("out", ranks=ranks)
-                    estimated = summary["accuracy"]["estimated_error"]
-                    error = abs(summary["final"]["pressure_gate_Pa"] / PRESSURE - 1)
-                    self.assertGreater(estimated, error / 2)
-                    self.assertLess(estimated, 0.03)
-                    self.assertIn("to halve the error by", log)
+    def check(self, *arguments):
+        finished = run([SOURCE / "scripts" / "budgets", "--bin", BINARIES, "-o", self.folder / "budgets", *arguments])
+        self.assertEqual(finished.returncode, 0, finished.stdout + finished.stderr)
+        return finished.stdout
+
+    def test_estimates_are_within_a_factor_of_two_of_the_truth_on_every_closed_form(self):
+        self.assertGreater(len(self.check("--levels", "draft").splitlines()), 25)
+        words = [word for name in ("known flow", "channel, power law", "squeezed", "softens", "axisymmetric", "plane strain", "upsetting, 3D, m = 0.3")
+                 for word in ("--scene", name)]
+        self.check("--levels", "standard", *words)
+
+    def test_on_ranks_the_estimate_is_of_the_same_size_and_names_a_knob(self):
+        self.mesh(8)
+        alone, (log, together) = self.fill("alone")[1], self.fill("together", ranks=3)
+        estimates = [summary["accuracy"]["estimated_error"] for summary in (alone, together)]
+        self.assertLess(max(estimates) / min(estimates), 2)
+        self.assertIn("to halve the error by", log)
 
     def test_a_run_that_does_not_ask_makes_no_other_mesh(self):
         self.mesh(6)

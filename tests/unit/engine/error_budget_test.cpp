@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "base/error.hpp"
@@ -16,9 +17,9 @@ ErrorBudget two_sources() {
   return budget;
 }
 
-TEST(ErrorBudget, SumsItsSourcesAndPutsTheLargestFirst) {
+TEST(ErrorBudget, AddsTheSquaresOfItsSourcesAndPutsTheLargestFirst) {
   const ErrorBudget budget = two_sources();
-  EXPECT_NEAR(budget.total(), 0.0201, 1e-15);
+  EXPECT_NEAR(budget.total(), std::hypot(1e-4, 0.02), 1e-15);
   ASSERT_EQ(budget.shares().size(), 2U);
   EXPECT_EQ(budget.shares().front().source, "space");
   EXPECT_EQ(budget.json().at(1).at("knob"), "[solver] linear_tolerance");
