@@ -96,7 +96,7 @@ class Expression::Formula {
   std::string describe(const std::string& text, const mu::Parser::exception_type& error) const {
     const bool is_placed = error.GetPos() >= 0 && static_cast<std::size_t>(error.GetPos()) <= text.size();
     const std::size_t position = is_placed ? static_cast<std::size_t>(error.GetPos()) : 0;
-    const std::string token = error.GetToken();
+    const std::string& token = error.GetToken();
     if (error.GetCode() != mu::ecUNASSIGNABLE_TOKEN) return fault_at(text, position, error.GetMsg());
     std::vector<std::string> known = variables_;
     for (const auto& [name, value] : parser_.GetConst()) known.push_back(name);

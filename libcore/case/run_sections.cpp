@@ -9,7 +9,7 @@ namespace malleus {
 namespace {
 
 Unit parse_length_unit(std::string_view text) {
-  const Unit unit = parse_unit(text);
+  Unit unit = parse_unit(text);
   if (!(unit.dimension == parse_unit("m").dimension)) {
     throw InputError(fmt::format("'{}' is no length; expected a unit like mm", text));
   }
@@ -159,7 +159,8 @@ void LimitSettings::describe(Section& s) {
 void PartitionSettings::describe(Section& s) {
   s.choice("method", method,
            {{"curve", PartitionMethod::curve}, {"scotch", PartitionMethod::scotch}, {"cost", PartitionMethod::cost}},
-           "stretches of a space-filling curve, least computing plus communication time, or the same from a start by PT-Scotch");
+           "stretches of a space-filling curve, least computing plus communication time, or the same from a start by "
+           "PT-Scotch");
   s.choice("balance", balance, {{"counted", Balance::counted}, {"measured", Balance::measured}},
            "work of elements and nodes counted, or shares by speeds measured in each increment (then the bytes of two "
            "runs differ)");

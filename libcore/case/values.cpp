@@ -15,13 +15,13 @@
 namespace malleus {
 namespace {
 
-std::string with_unit(std::string number, const std::string& unit) {
+std::string with_unit(const std::string& number, const std::string& unit) {
   return unit.empty() ? number : number + " " + unit;
 }
 
 /// The unit of a key. Values are written in it as they are held, in SI.
 Unit coherent_unit(std::string_view text) {
-  const Unit unit = parse_unit(text);
+  Unit unit = parse_unit(text);
   check(unit.numerator == 1 && unit.denominator == 1 && unit.offset == 0, "the unit of a key must be coherent SI");
   return unit;
 }

@@ -89,6 +89,35 @@ void append_text(const std::filesystem::path& file, const std::string& text) {
   if (!stream) throw StorageError(fmt::format("{}: cannot be written", file.string()));
 }
 
+/// The whole rows of a file, without its header, that were written until that time; empty where there is no file.
+std::string rows_until(Real time, const std::filesystem::path& file) {
+  std::string kept;
+  if (!std::filesystem::exists(file)) return kept;
+  const std::vector<std::string> lines = read_whole_lines(file);
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    Real row_time = 0;
+    const auto parsed = std::from_chars(lines[i].data(), lines[i].data() + lines[i].size(), row_time);
+    if (parsed.ec == std::errc() && row_time <= time * (1 + 1e-12)) kept += lines[i] + "\n";
+  }
+  return kept;
+}
+
+/// points: [point][dim]. Cells of points outside the mesh stay empty.
+std::string rows_at(Real time, const std::vector<Real>& points, const PointValues& values, std::size_t dim) {
+  const std::size_t count = values.found.size();
+  const std::size_t width = count > 0 ? values.values.size() / count : 0;
+  std::string text;
+  for (std::size_t i = 0; i < count; ++i) {
+    text += fmt::format("{},{}", history_text(time), i);
+    for (std::size_t c = 0; c < 3; ++c) text += "," + history_text(c < dim ? points[i * dim + c] : 0.0);
+    for (std::size_t c = 0; c < width; ++c) {
+      text += "," + (values.found[i] != 0 ? history_text(values.values[i * width + c]) : "");
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 Probes::Probes(const Communicator& comm, const Mesh& mesh, const std::vector<ProbeSettings>& settings)
@@ -131,16 +160,7 @@ void Probes::resume(const std::filesystem::path& directory, const FieldStore& fi
   directory_ = directory;
   on_root(comm_, [&] {
     for (const Probe& probe : probes_) {
-      std::string kept = header(probe, fields);
-      if (std::filesystem::exists(file_of(probe))) {
-        const std::vector<std::string> lines = read_whole_lines(file_of(probe));
-        for (std::size_t i = 1; i < lines.size(); ++i) {
-          Real row_time = 0;
-          const auto parsed = std::from_chars(lines[i].data(), lines[i].data() + lines[i].size(), row_time);
-          if (parsed.ec == std::errc() && row_time <= time * (1 + 1e-12)) kept += lines[i] + "\n";
-        }
-      }
-      write_file_atomically(file_of(probe), kept);
+      write_file_atomically(file_of(probe), header(probe, fields) + rows_until(time, file_of(probe)));
     }
   });
 }
@@ -157,24 +177,9 @@ void Probes::record(Real time, const Mesh& mesh, const FieldStore& fields) {
   for (const Probe& probe : probes_) {
     const std::vector<const Field*> chosen = fields_of(probe, fields);
     const PointValues values = values_at_points(comm_, mesh, chosen, probe.points);
-    const std::size_t count = values.found.size();
     warn_of_points_outside(probe, values.found);
-    const std::size_t width = count > 0 ? values.values.size() / count : 0;
-    on_root(comm_, [&] {
-      std::string text;
-      for (std::size_t i = 0; i < count; ++i) {
-        text += fmt::format("{},{}", history_text(time), i);
-        for (std::size_t c = 0; c < 3; ++c) {
-          const bool exists = c < static_cast<std::size_t>(dim_);
-          text += "," + history_text(exists ? probe.points[i * static_cast<std::size_t>(dim_) + c] : 0.0);
-        }
-        for (std::size_t c = 0; c < width; ++c) {
-          text += "," + (values.found[i] != 0 ? history_text(values.values[i * width + c]) : "");
-        }
-        text += "\n";
-      }
-      append_text(file_of(probe), text);
-    });
+    on_root(comm_,
+            [&] { append_text(file_of(probe), rows_at(time, probe.points, values, static_cast<std::size_t>(dim_))); });
   }
 }
 

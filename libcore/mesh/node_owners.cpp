@@ -85,6 +85,14 @@ class OwnerChoice {
     }
   }
 
+  /// Puts a number and its owner down for the other holders.
+  void tell(const std::vector<int>& holders, std::initializer_list<GlobalId> owner,
+            std::map<int, std::vector<GlobalId>>& told) const {
+    for (const int rank : holders) {
+      if (rank != comm_.rank()) told[rank].insert(told[rank].end(), owner);
+    }
+  }
+
   std::vector<int> tell_owners() const {
     std::vector<int> owners(shared_.numbers.size(), -1);
     std::map<int, std::vector<GlobalId>> told;  // pairs: number, owner
@@ -92,11 +100,8 @@ class OwnerChoice {
       std::size_t next = 0;
       for (std::size_t h = 0; h < holders.size(); ++h) {
         for (std::int64_t n = 0; n < group.given[h]; ++n) {
-          const std::size_t i = group.nodes[next++];
-          owners[i] = holders[h];
-          for (const int rank : holders) {
-            if (rank != comm_.rank()) told[rank].insert(told[rank].end(), {shared_.numbers[i], holders[h]});
-          }
+          owners[group.nodes[next]] = holders[h];
+          tell(holders, {shared_.numbers[group.nodes[next++]], holders[h]}, told);
         }
       }
     }

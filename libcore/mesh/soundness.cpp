@@ -58,7 +58,7 @@ GlobalId count_flat(const MeshPiece& piece) {
     for (LocalId e = 0; e < piece.elements(); ++e) {
       SimplexPoints<D> points;
       for (int i = 0; i <= D; ++i) {
-        const LocalId node = piece.element_nodes[static_cast<std::size_t>(e * (D + 1) + i)];
+        const LocalId node = piece.element_nodes[static_cast<std::size_t>(e) * (D + 1) + static_cast<std::size_t>(i)];
         points.col(i) = Eigen::Map<const Point<D>>(piece.coordinates.data() + static_cast<std::size_t>(node) * D);
       }
       if (std::abs(simplex_quality<D>(points)) < flat_quality) ++flat;
@@ -73,7 +73,7 @@ Real signed_volume(const MeshPiece& piece, LocalId e) {
     constexpr int D = decltype(d)::value;
     SimplexPoints<D> points;
     for (int i = 0; i <= D; ++i) {
-      const LocalId node = piece.element_nodes[static_cast<std::size_t>(e * (D + 1) + i)];
+      const LocalId node = piece.element_nodes[static_cast<std::size_t>(e) * (D + 1) + static_cast<std::size_t>(i)];
       points.col(i) = Eigen::Map<const Point<D>>(piece.coordinates.data() + static_cast<std::size_t>(node) * D);
     }
     return simplex_volume<D>(points);

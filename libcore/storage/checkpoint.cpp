@@ -77,7 +77,7 @@ void write_part(const fs::path& path, const Mesh& mesh, const FieldStore& fields
 nlohmann::json read_manifest(const fs::path& directory) {
   try {
     const nlohmann::json sealed = nlohmann::json::parse(read_text_file(directory / "manifest.json"));
-    const nlohmann::json content = sealed.at("content");
+    nlohmann::json content = sealed.at("content");
     if (sealed.at("crc32").get<GlobalId>() != text_checksum(content.dump())) throw StorageError("wrong checksum");
     if (content.at("format").get<int>() != format_version) throw StorageError("unknown format");
     return content;
@@ -260,8 +260,8 @@ void put_in_place(const fs::path& aside, const fs::path& target) {
 
 }  // namespace
 
-CheckpointStore::CheckpointStore(const Communicator& comm, fs::path output_directory)
-    : comm_(comm), directory_(std::move(output_directory) / "checkpoints") {}
+CheckpointStore::CheckpointStore(const Communicator& comm, const fs::path& output_directory)
+    : comm_(comm), directory_(output_directory / "checkpoints") {}
 
 struct CheckpointStore::Content {
   GlobalId increment;

@@ -33,7 +33,7 @@ struct SavedState {
 /// collective; failures are StorageErrors on all ranks.
 class CheckpointStore {
  public:
-  CheckpointStore(const Communicator& comm, std::filesystem::path output_directory);
+  CheckpointStore(const Communicator& comm, const std::filesystem::path& output_directory);
 
   void write(GlobalId increment, const Mesh& mesh, const FieldStore& fields, const nlohmann::json& state,
              const std::vector<Real>& local = {});

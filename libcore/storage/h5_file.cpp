@@ -191,16 +191,18 @@ void H5File::write_dataset(const std::string& path, std::span<const T> values, c
   }
 }
 
-void H5File::write(const std::string& path, std::span<const double> values, std::vector<std::uint64_t> dims) {
+void H5File::write(const std::string& path, std::span<const double> values, const std::vector<std::uint64_t>& dims) {
   write_dataset(path, values, dims);
 }
-void H5File::write(const std::string& path, std::span<const float> values, std::vector<std::uint64_t> dims) {
+void H5File::write(const std::string& path, std::span<const float> values, const std::vector<std::uint64_t>& dims) {
   write_dataset(path, values, dims);
 }
-void H5File::write(const std::string& path, std::span<const std::int32_t> values, std::vector<std::uint64_t> dims) {
+void H5File::write(const std::string& path, std::span<const std::int32_t> values,
+                   const std::vector<std::uint64_t>& dims) {
   write_dataset(path, values, dims);
 }
-void H5File::write(const std::string& path, std::span<const std::int64_t> values, std::vector<std::uint64_t> dims) {
+void H5File::write(const std::string& path, std::span<const std::int64_t> values,
+                   const std::vector<std::uint64_t>& dims) {
   write_dataset(path, values, dims);
 }
 

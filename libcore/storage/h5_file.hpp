@@ -31,10 +31,10 @@ class H5File {
 
   /// Contiguous datasets (in chunks where they are checked); dims: their shape, row-major; the product is
   /// values.size().
-  void write(const std::string& path, std::span<const double> values, std::vector<std::uint64_t> dims);
-  void write(const std::string& path, std::span<const float> values, std::vector<std::uint64_t> dims);
-  void write(const std::string& path, std::span<const std::int32_t> values, std::vector<std::uint64_t> dims);
-  void write(const std::string& path, std::span<const std::int64_t> values, std::vector<std::uint64_t> dims);
+  void write(const std::string& path, std::span<const double> values, const std::vector<std::uint64_t>& dims);
+  void write(const std::string& path, std::span<const float> values, const std::vector<std::uint64_t>& dims);
+  void write(const std::string& path, std::span<const std::int32_t> values, const std::vector<std::uint64_t>& dims);
+  void write(const std::string& path, std::span<const std::int64_t> values, const std::vector<std::uint64_t>& dims);
   void write_text(const std::string& path, const std::string& text);
 
   bool has(const std::string& path) const;

@@ -222,7 +222,7 @@ nlohmann::json describe(const Mesh& mesh, const FieldStore& fields, int parts) {
 nlohmann::json read_head(const H5File& file, const fs::path& path) {
   if (!file.has("/malleus_mesh")) throw InputError(fmt::format("{}: is no mesh file of Malleus", path.string()));
   const std::vector<std::int32_t> letters = file.read_int32("/malleus_mesh");
-  const nlohmann::json head = nlohmann::json::parse(std::string(letters.begin(), letters.end()));
+  nlohmann::json head = nlohmann::json::parse(std::string(letters.begin(), letters.end()));
   if (head.at("format").get<int>() != format_version) {
     throw InputError(fmt::format("{}: is of an unknown format version", path.string()));
   }

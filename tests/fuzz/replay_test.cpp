@@ -1,6 +1,7 @@
-/// Every input of the corpus, those that once broke a reader among them, is taken or refused: no crash, no hang, and
-/// the same on all ranks.
+/// Every input of the corpus, those that once broke a reader among them, is taken or refused, whole or damaged: no
+/// crash, no hang, and the same on all ranks.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,17 +27,41 @@ std::vector<fs::path> files_in(const fs::path& directory) {
   return files;
 }
 
-class Corpus : public testing::TestWithParam<std::string_view> {};
+std::string read_bytes(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+class Corpus : public testing::TestWithParam<std::string_view> {
+ protected:
+  Corpus() { log::start(false, log::Level::quiet); }
+
+  void enter(std::string_view bytes, const std::string& what) {
+    EXPECT_NO_THROW(find_door(GetParam())(test::world(), bytes, scratch_.path().string())) << what;
+  }
+
+  const std::vector<fs::path> files_ = files_in(fs::path(MALLEUS_CORPUS) / GetParam());
+
+ private:
+  test::ScratchDirectory scratch_;
+};
 
 TEST_P(Corpus, IsTakenOrRefused) {
-  log::start(false, log::Level::quiet);
-  const test::ScratchDirectory scratch;
-  const std::vector<fs::path> files = files_in(fs::path(MALLEUS_CORPUS) / GetParam());
-  EXPECT_GE(files.size(), 2U);
-  for (const fs::path& path : files) {
-    std::ifstream file(path, std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    EXPECT_NO_THROW(find_door(GetParam())(test::world(), bytes, scratch.path().string())) << path;
+  EXPECT_GE(files_.size(), 2U);
+  for (const fs::path& path : files_) enter(read_bytes(path), path.string());
+}
+
+TEST_P(Corpus, CutOrFlippedAnywhereIsTakenOrRefused) {
+  constexpr std::size_t places = 12;
+  for (const fs::path& path : files_) {
+    const std::string whole = read_bytes(path);
+    for (std::size_t k = 0; k < places; ++k) {
+      const std::size_t at = whole.size() * (2 * k + 1) / (2 * places);
+      enter(std::string_view(whole).substr(0, at), fmt::format("{} cut after {} bytes", path.string(), at));
+      std::string flipped = whole;
+      flipped[at] = static_cast<char>(flipped[at] ^ (1 << k % 8));
+      enter(flipped, fmt::format("{} with bit {} of byte {} flipped", path.string(), k % 8, at));
+    }
   }
 }
 

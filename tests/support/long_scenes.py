@@ -48,8 +48,8 @@ method = cost
 
 
 def press(directory):
-    """A hammer on a block of three dimensions, whose energy is spent bit by bit."""
-    return upsetting(directory, 3, "press = hammer\nenergy = 8e5\nmass = 1.6e6\n") + "[remesh]\nevery = 3\n"
+    """A hammer on a block of three dimensions, whose energy is spent bit by bit, and a flow to compare with."""
+    return upsetting(directory, 3, "press = hammer\nenergy = 8e5\nmass = 1.6e6\n") + "[remesh]\nevery = 3\n[reference]\nvelocity_z = \"-z\"\n"
 
 
 def heat(directory):
