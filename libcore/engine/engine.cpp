@@ -20,11 +20,21 @@ namespace malleus {
 namespace {
 
 constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes take more than seconds to make coarser
-constexpr int most_cuts = 12;                      ///< of one increment's step, each to a half
-constexpr Real growth_after_cut = 1.5;             ///< of the step from one increment to the next
+constexpr Real seconds_of_rehearsal = 3;           ///< processor time that --check may spend on a forecast
+// Measured: processor time of writing fields, a rank and a node, and of a checkpoint, a rank.
+constexpr Real output_s = 4e-3;
+constexpr Real output_s_per_node = 2e-6;
+constexpr Real checkpoint_s = 15e-3;
+constexpr int most_cuts = 12;           ///< of one increment's step, each to a half
+constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
 /// Times the last increment and the longest checkpoint, kept free before the wall time ends.
 constexpr Real wall_time_margin = 1.3;
 constexpr Real first_checkpoint_in_outputs = 2;  ///< time of a checkpoint before there was one, in outputs of fields
+
+/// Of solvers and their libraries, beyond what mesh and fields take (measured).
+Real solver_bytes(int dim, Real nodes, int ranks) {
+  return 14e6 * ranks + nodes * (dim == 3 ? 3e3 : 1e3);
+}
 
 /// Equal shares of a state that was read on another number of ranks than wrote it.
 void balance_saved(const Communicator& comm, SavedState& saved) {
@@ -109,17 +119,27 @@ void Engine::print_plan() {
   report::print_plan(process_, settings_, comm_);
 }
 
-/// What a trial on coarser meshes tells of the time and the error of space.
+/// What a rehearsal on coarser meshes tells of time, memory and error of the run.
 void Engine::print_outlook() {
   if (process_.mesh().total_nodes() > most_nodes_of_trials * comm_.size()) return;
-  space_estimate_.prepare(process_);
-  const bool is_steady = settings_.increments && *settings_.increments == 0;
-  const auto outlook = space_estimate_.look_ahead(process_, settings_.step, is_steady);
+  const RunPlan plan = {settings_.step, settings_.end, settings_.increments};
+  const auto memory = static_cast<Real>(comm_.sum(peak_memory_bytes()));
+  const Real spent = comm_.sum(processor_seconds());
+  const auto outlook = space_estimate_.look_ahead(process_, plan, seconds_of_rehearsal);
   if (!outlook) return;
-  const Real increments = static_cast<Real>(std::max<GlobalId>(process_.forecast().increments, 1));
-  log::info("by a trial on coarser meshes: {:.2g} s an increment, {} in all{}", outlook->increment_s,
-            report::duration(outlook->increment_s * increments),
-            outlook->error > 0 ? fmt::format("; error of space about {:.2g} %", 100 * outlook->error) : "");
+  const auto nodes = static_cast<Real>(process_.mesh().total_nodes());
+  const Real estimates = plan.is_steady() || !process_.solves_again() ? 1 : 2;
+  const Real outputs = outlook->increments / static_cast<Real>(settings_.output_every) + 2;
+  const Real total = spent + outlook->total_s() + estimates * (outlook->making_s + outlook->coarse_s) +
+                     outputs * (output_s * comm_.size() + output_s_per_node * nodes) + checkpoint_s * comm_.size();
+  log::info(
+      "rehearsed on coarser meshes: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
+      "MiB",
+      outlook->increments, outlook->increment_s, total, report::duration(total / comm_.size()), comm_.size(),
+      comm_.size() == 1 ? "" : "s",
+      (memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0)) / 1048576);
+  log::info("expected error {:.2g} %: of space {:.2g} %, of other sources {:.2g} %",
+            100 * std::hypot(outlook->error, outlook->other_error), 100 * outlook->error, 100 * outlook->other_error);
 }
 
 void Engine::open_outputs() {

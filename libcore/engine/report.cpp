@@ -84,6 +84,7 @@ nlohmann::json summary(const Communicator& comm, Process& process, const RunSett
          {{"min", comm.min(row.wall_s)}, {"mean", comm.sum(row.wall_s) / comm.size()}, {"max", comm.max(row.wall_s)}}}};
   }
   const LinearTotals linear = process.linear_totals();
+  summary["processor_s"] = comm.sum(processor_seconds());
   summary["linear"] = {{"solves", linear.solves},
                        {"iterations", linear.iterations},
                        {"failures", linear.failures},

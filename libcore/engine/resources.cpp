@@ -24,4 +24,13 @@ GlobalId peak_memory_bytes() {
   return static_cast<GlobalId>(usage.ru_maxrss) * 1024;
 }
 
+Real processor_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<Real>(time.tv_sec) + 1e-6 * static_cast<Real>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
 }  // namespace malleus

@@ -10,4 +10,7 @@ Real wall_clock();                ///< monotonic, s: no setting of the clock mov
 Real wall_since_program_start();  ///< s since this process was loaded
 GlobalId peak_memory_bytes();     ///< peak resident set of this process
 
+/// Processor time of this rank since the start of the program, s.
+Real processor_seconds();
+
 }  // namespace malleus

@@ -23,6 +23,8 @@
 namespace malleus {
 namespace {
 
+constexpr Real seconds_of_rehearsal = 3;  ///< processor time, for target_time
+
 std::string level_name(Level level) {
   return std::string(level_names[static_cast<std::size_t>(level)]);
 }
@@ -168,11 +170,16 @@ std::vector<std::string> settings_for_targets(const Communicator& comm, Simulato
   {
     const std::unique_ptr<Process> process = simulator.assemble(comm, mesh, reader);
     SpaceEstimate trial(comm, [&](Mesh other) { return simulator.assemble(comm, std::move(other), reader); });
-    trial.prepare(*process);
     const TimeSettings& time = simulator.time();
-    outlook = trial.look_ahead(*process, time.step.value_or(std::numeric_limits<Real>::infinity()),
-                               time.increments && *time.increments == 0);
-    expected.increments = static_cast<Real>(std::max<GlobalId>(process->forecast().increments, 1));
+    RunPlan plan;
+    if (time.step) plan.step = *time.step;
+    if (time.end) plan.end = *time.end;
+    plan.increments = time.increments;
+    outlook = trial.look_ahead(*process, plan, asked.target_time ? seconds_of_rehearsal : 0);
+    if (outlook) {
+      expected.increments = outlook->increments;
+      outlook->increment_s = outlook->total_s() / outlook->increments / comm.size();  // wall time
+    }
     expected.dimension = mesh.dim;
     expected.steps_follow_sizes = process->steps_follow_sizes();
   }

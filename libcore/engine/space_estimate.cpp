@@ -21,16 +21,21 @@ constexpr std::array<Real, 2> coarsenings = {2, 1.5};
 constexpr Real least_ratio = 1.2;  ///< of mean sizes: below it two meshes do not tell apart
 constexpr std::array<GlobalId, 4> fewest_elements = {0, 0, 8, 30};  ///< [dimension] of a mesh that says something
 constexpr Real usual_order = 1.75;
-constexpr Real growth_of_time = 1.1;  ///< of an increment's time with the number of elements, as an exponent
 
 Real size_ratio(const Mesh& fine, const Mesh& coarse) {
   return std::pow(static_cast<Real>(fine.total_elements) / static_cast<Real>(coarse.total_elements), 1.0 / fine.dim);
 }
 
-Real difference(const std::vector<Real>& a, const std::vector<Real>& b, Real scale) {
-  Real sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
-  return sum / scale;
+/// What part of a run on its own mesh told, over what was extrapolated from coarser ones.
+Rehearsal with_own_part(const Rehearsal& own, const Rehearsal& extrapolated) {
+  constexpr Real enough_increments = 4;
+  constexpr Real enough_progress = 0.3;
+  Rehearsal run = extrapolated;
+  run.first_s = own.first_s;
+  run.other_error = own.other_error;
+  if (own.done >= enough_increments || own.done >= own.increments) run.later_s = own.later_s;
+  if (own.done >= enough_progress * own.increments) run.increments = own.increments;
+  return run;
 }
 
 FieldStore copy_of(const Mesh& mesh, const FieldStore& fields) {
@@ -54,8 +59,7 @@ std::vector<std::pair<FieldSpec, std::vector<Real>>> taken_from(const FieldStore
 }  // namespace
 
 /// The fine process' state on a mesh of about so many times the sizes; null where there is none.
-std::unique_ptr<Process> SpaceEstimate::coarser(const Process& finest, const Process& fine, FieldStore& fine_fields,
-                                                Real coarsening) const {
+std::unique_ptr<Process> SpaceEstimate::coarser(const Process& fine, FieldStore& fine_fields, Real coarsening) const {
   Mesh mesh = fine.mesh();
   FieldStore fields = copy_of(mesh, fine_fields);
   std::vector<Real> sizes = current_sizes(comm_, mesh).values();
@@ -68,12 +72,14 @@ std::unique_ptr<Process> SpaceEstimate::coarser(const Process& finest, const Pro
     return nullptr;
   std::unique_ptr<Process> twin = factory_(mesh);
   twin->restore(std::move(mesh), taken_from(fields), fine.save_state());
-  twin->solve_all_next();
-  twin->stand_as_it_is(size_ratio(finest.mesh(), twin->mesh()));
   return twin;
 }
 
 void SpaceEstimate::prepare(Process& process) {
+  make_twins(process, true);
+}
+
+void SpaceEstimate::make_twins(Process& process, bool compares) {
   twins_.clear();
   if (!factory_) return;
   const log::Silence silence;
@@ -81,8 +87,12 @@ void SpaceEstimate::prepare(Process& process) {
     const Process* finer = &process;
     FieldStore* fields = &process.fields();
     for (const Real coarsening : coarsenings) {
-      auto twin = coarser(process, *finer, *fields, coarsening);
+      auto twin = coarser(*finer, *fields, coarsening);
       if (!twin) return;
+      if (compares) {
+        twin->solve_all_next();
+        twin->stand_as_it_is(size_ratio(process.mesh(), twin->mesh()));
+      }
       finer = twins_.emplace_back(std::move(twin)).get();
       fields = &twins_.back()->fields();
     }
@@ -135,53 +145,44 @@ void SpaceEstimate::compare(Process& process, const std::optional<Increment>& in
   twins_.clear();
 }
 
-std::optional<Outlook> SpaceEstimate::look_ahead(const Process& process, Real largest_step, bool steady) {
-  std::vector<Real> seconds;
-  std::vector<std::vector<Real>> results;
-  std::vector<Real> elements;
+std::optional<Outlook> SpaceEstimate::look_ahead(Process& process, const RunPlan& plan, Real most_s) {
+  Outlook outlook;
+  const Real began = comm_.sum(processor_seconds());
+  make_twins(process, false);
+  outlook.making_s = comm_.sum(processor_seconds()) - began;
+  std::vector<Rehearsal> seen;
   for (const auto& twin : twins_) {
-    const Real began = wall_clock();
-    const auto found = first_results_of(*twin, largest_step, steady);
-    if (!found) break;
-    seconds.push_back(comm_.max(wall_clock() - began));
-    results.push_back(*found);
-    elements.push_back(static_cast<Real>(twin->mesh().total_elements));
-  }
-  std::optional<Outlook> outlook;
-  if (!results.empty()) {
-    const Real ratio = size_ratio(process.mesh(), twins_[0]->mesh());
-    outlook =
-        Outlook{seconds[0] * std::pow(static_cast<Real>(process.mesh().total_elements) / elements[0], growth_of_time),
-                0, usual_order};
-    Real scale = 0;
-    for (const Real result : results[0]) scale += std::abs(result);
-    if (results.size() > 1 && results[1].size() == results[0].size() && scale > 0) {
-      const Real second_ratio = size_ratio(twins_[0]->mesh(), twins_[1]->mesh());
-      const Real of_twin = difference(results[0], results[1], scale) / (std::pow(second_ratio, usual_order) - 1);
-      outlook->error = of_twin / std::pow(ratio, usual_order);
-    }
+    auto rehearsal = rehearse(comm_, *twin, plan, most_s / static_cast<Real>(twins_.size()));
+    if (!rehearsal) break;
+    outlook.coarse_s += rehearsal->first_s;
+    seen.push_back(std::move(*rehearsal));
   }
   twins_.clear();
-  return outlook;
-}
-
-std::optional<std::vector<Real>> SpaceEstimate::first_results_of(Process& twin, Real largest_step, bool steady) const {
-  {
-    const log::Silence silence;
-    try {
-      if (!steady) {
-        for (Component* component : twin.components()) component->start();
-      }
-    } catch (const InputError&) {
-      return std::nullopt;
-    } catch (const NumericsError&) {
-      return std::nullopt;
+  if (seen.empty()) return std::nullopt;
+  const Mesh& mesh = process.mesh();
+  const auto nodes = static_cast<Real>(mesh.total_nodes());
+  Rehearsal run = extrapolated_run(seen, nodes, mesh.dim, process.steps_follow_sizes());
+  MeshComparison comparison;
+  if (run.first_s + 2 * run.later_s < most_s) {
+    if (const auto own = rehearse(comm_, process, plan, most_s)) {
+      run = with_own_part(*own, run);
+      comparison = {{1}, {own->results}};
     }
   }
-  if (steady) return results_of(twin, std::nullopt);
-  const Real dt = std::min(largest_step, twin.largest_step());
-  if (!std::isfinite(dt) || !(dt > 0)) return std::nullopt;
-  return results_of(twin, Increment{1, dt, dt});
+  outlook.increment_s = plan.is_steady() ? run.first_s : run.later_s;
+  outlook.increments = run.increments;
+  outlook.first_s = run.first_s;
+  outlook.other_error = run.other_error;
+  outlook.solves = run.solves;
+  const Real base = comparison.sizes.empty() ? seen[0].nodes : nodes;  // the finest of which results are known
+  for (const Rehearsal& one : seen) {
+    comparison.sizes.push_back(std::pow(base / one.nodes, 1.0 / mesh.dim));
+    comparison.results.push_back(one.results);
+  }
+  const auto is_comparable = [&](const auto& results) { return results.size() == comparison.results[0].size(); };
+  if (comparison.sizes.size() < 2 || !std::ranges::all_of(comparison.results, is_comparable)) return outlook;
+  outlook.error = extrapolated_error(comparison) / std::pow(nodes / base, usual_order / mesh.dim);
+  return outlook;
 }
 
 std::optional<ErrorShare> SpaceEstimate::share(bool remeshes) const {

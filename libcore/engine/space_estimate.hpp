@@ -11,6 +11,7 @@
 
 #include "engine/extrapolation.hpp"
 #include "engine/process.hpp"
+#include "engine/rehearsal.hpp"
 #include "parallel/communicator.hpp"
 
 namespace malleus {
@@ -18,11 +19,18 @@ namespace malleus {
 /// The run's scene as a new process on another mesh. Collective; may throw.
 using ProcessFactory = std::function<std::unique_ptr<Process>(Mesh)>;
 
-/// What the first increment on coarser meshes lets one expect of the first on the process' own.
+/// What rehearsals on coarser meshes let one expect of a run on its own mesh. Processor times in s, over all ranks.
 struct Outlook {
-  Real increment_s = 0;  ///< wall time
+  Real increment_s = 0;  ///< of an increment after the first
   Real error = 0;        ///< of space, relative; 0 where only one coarser mesh could be made
   Real order = 1.75;     ///< at which it falls with the sizes
+  Real increments = 1;   ///< of the whole run
+  Real first_s = 0;      ///< of the start and the first increment
+  Real making_s = 0;     ///< of making the coarser meshes: what an estimate of the error takes besides increments
+  Real coarse_s = 0;     ///< of the first increment on all of them
+  bool solves = false;   ///< linear systems
+  Real other_error = 0;  ///< relative: of the sources other than space
+  Real total_s() const { return first_s + (increments - 1) * increment_s; }
 };
 
 /// Repeats increments of a process on coarser meshes. Collective throughout.
@@ -38,9 +46,10 @@ class SpaceEstimate {
   /// After that increment (none: of a scene that was solved as it stands): does the same there, and compares.
   void compare(Process& process, const std::optional<Increment>& increment);
 
-  /// After prepare() on a process that has not started: starts there, does the first increment (steady: solves the
-  /// scene as it stands), and extrapolates. largest_step: s. None where no coarser mesh could be made or solved.
-  std::optional<Outlook> look_ahead(const Process& process, Real largest_step, bool steady);
+  /// Of a process that has not started and is not used afterwards: runs it ahead on coarser meshes, and on its own
+  /// where that is cheap, each to its end or until most_s processor seconds are spent, and extrapolates. None where no
+  /// coarser mesh could be made or solved.
+  std::optional<Outlook> look_ahead(Process& process, const RunPlan& plan, Real most_s);
 
   /// Of the last comparison; none where no coarser mesh could be made or solved.
   std::optional<ErrorShare> share(bool remeshes) const;
@@ -49,11 +58,9 @@ class SpaceEstimate {
   void restore(const nlohmann::json& saved) { saved_ = saved; }
 
  private:
-  std::unique_ptr<Process> coarser(const Process& finest, const Process& fine, FieldStore& fine_fields,
-                                   Real coarsening) const;
+  void make_twins(Process& process, bool compares);
+  std::unique_ptr<Process> coarser(const Process& fine, FieldStore& fine_fields, Real coarsening) const;
   std::optional<std::vector<Real>> results_of(Process& process, const std::optional<Increment>& increment) const;
-
-  std::optional<std::vector<Real>> first_results_of(Process& twin, Real largest_step, bool steady) const;
 
   const Communicator& comm_;
   ProcessFactory factory_;

@@ -73,6 +73,15 @@ class Budget(Folder):
         self.assertEqual(rows[0], rows[1])
 
 
+class Forecast(Folder):
+    def test_what_a_check_foretells_is_what_the_run_takes(self):
+        # Processor time on a machine with other work is uncertain by half: three times is wrong in any case.
+        words = [word for name in ("steady", "channel/case", "upsetting/axi", "press") for word in ("--case", name)]
+        finished = run([SOURCE / "scripts" / "forecasts", "--bin", BINARIES, "-o", self.folder / "forecasts", *words])
+        self.assertEqual(finished.returncode, 0, finished.stdout + finished.stderr)
+        self.assertIn("4 cases", finished.stdout)
+
+
 class Targets(Folder):
     def test_the_mesh_is_chosen_so_that_the_error_is_met(self):
         self.mesh(8)
