@@ -121,7 +121,7 @@ Outcome Flow::advance(const Increment& increment) {
   state_.flow_updated = increment.number == 1;  // start() solved it for this increment
   ++state_.increments_since_flow;
   if (is_due(present_drives(increment.start()))) {
-    const Outcome outcome = solve(increment.start(), increment.dt);
+    Outcome outcome = solve(increment.start(), increment.dt);
     if (outcome.kind != Outcome::Kind::done) return outcome;
     state_.flow_updated = true;
   }

@@ -190,7 +190,7 @@ Outcome Front::advance(const Increment& increment) {
     const Real dt = left / parts;
     if (renew_velocity_) renew_velocity_(start + 0.5 * dt);
     const Real crossed = dt * crossing_rate();
-    const Outcome outcome = substep(start, dt);
+    Outcome outcome = substep(start, dt);
     if (outcome.kind != Outcome::Kind::done) {
       roll_back();
       return outcome;

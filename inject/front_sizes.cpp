@@ -100,15 +100,15 @@ bool front_left_fine_elements(const Scene& scene, const FrontSet& fronts) {
   for (std::size_t i = 0; i < fronts.size(); ++i) {
     const std::span<const Real> level_set = fronts.values(i);
     const auto value = [&](LocalId node) { return level_set[static_cast<std::size_t>(node)]; };
+    const auto count_edge = [&](LocalId a, LocalId b) {
+      if (!(value(a) > 0 && value(b) < 0)) return;
+      // Along the front an edge may be long: what counts is its part across.
+      ++cut[0];
+      cut[1] += value(a) - value(b) > tolerated_size * *fine_size(scene) ? 1 : 0;
+    };
     for (LocalId e = 0; e < mesh.elements(); ++e) {
-      for (const LocalId a : mesh.nodes_of_element(e)) {
-        for (const LocalId b : mesh.nodes_of_element(e)) {
-          if (!(value(a) > 0 && value(b) < 0)) continue;
-          // Along the front an edge may be long: what counts is its part across.
-          ++cut[0];
-          cut[1] += value(a) - value(b) > tolerated_size * *fine_size(scene) ? 1 : 0;
-        }
-      }
+      const auto nodes = mesh.nodes_of_element(e);
+      for (const LocalId a : nodes) std::for_each(nodes.begin(), nodes.end(), [&](LocalId b) { count_edge(a, b); });
     }
   }
   scene.comm.sum_in_place(cut);

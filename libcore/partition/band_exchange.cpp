@@ -16,7 +16,7 @@ void append(std::vector<T>& target, const std::vector<T>& more) {
 void BandPiece::put(ByteWriter& writer) const {
   writer.put_list<GlobalId>(numbers);
   writer.put_list<Real>(weights);
-  writer.put_list<signed char>(sides);
+  writer.put_list<std::uint8_t>(sides);
   writer.put_list<std::array<Real, 2>>(outside);
   writer.put_list<Real>(third);
   writer.put_list<std::int32_t>(degrees);
@@ -28,7 +28,7 @@ BandPiece BandPiece::get(ByteReader& reader) {
   BandPiece piece;
   piece.numbers = reader.get_list<GlobalId>();
   piece.weights = reader.get_list<Real>();
-  piece.sides = reader.get_list<signed char>();
+  piece.sides = reader.get_list<std::uint8_t>();
   piece.outside = reader.get_list<std::array<Real, 2>>();
   piece.third = reader.get_list<Real>();
   piece.degrees = reader.get_list<std::int32_t>();

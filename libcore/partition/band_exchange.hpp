@@ -2,6 +2,7 @@
 
 /// Bands of vertices on their way to the rank that solves a pair's problem, and the answers.
 
+#include <cstdint>
 #include <vector>
 
 #include "parallel/byte_stream.hpp"
@@ -13,7 +14,7 @@ namespace malleus {
 struct BandPiece {
   std::vector<GlobalId> numbers;
   std::vector<Real> weights;
-  std::vector<signed char> sides;
+  std::vector<std::uint8_t> sides;
   std::vector<std::array<Real, 2>> outside;
   std::vector<Real> third;
   std::vector<std::int32_t> degrees;  ///< [vertex] edges inside the band

@@ -74,21 +74,24 @@ void merge_edges(const WorkGraph& fine, const Members& members, std::span<const 
                  WorkGraph& coarse) {
   std::vector<std::int64_t> place(static_cast<std::size_t>(coarse.vertices()), -1);
   coarse.start.assign(1, 0);
+  std::int64_t first_edge = 0;  // of the coarse vertex at hand
+  const auto add = [&](LocalId other, std::int32_t weight) {
+    std::int64_t& known = place[static_cast<std::size_t>(other)];
+    if (known < first_edge) {
+      known = static_cast<std::int64_t>(coarse.neighbours.size());
+      coarse.neighbours.push_back(other);
+      coarse.edge_weights.push_back(0);
+    }
+    coarse.edge_weights[static_cast<std::size_t>(known)] += weight;
+  };
   for (LocalId c = 0; c < coarse.owned(); ++c) {
-    const auto first_edge = static_cast<std::int64_t>(coarse.neighbours.size());
+    first_edge = static_cast<std::int64_t>(coarse.neighbours.size());
     for (LocalId m = members.start[static_cast<std::size_t>(c)]; m < members.start[static_cast<std::size_t>(c) + 1];
          ++m) {
       const LocalId v = members.list[static_cast<std::size_t>(m)];
       for (std::size_t j = fine.first(v); j < fine.last(v); ++j) {
         const LocalId other = all_coarse[static_cast<std::size_t>(fine.neighbours[j])];
-        if (other == c) continue;
-        std::int64_t& known = place[static_cast<std::size_t>(other)];
-        if (known < first_edge) {
-          known = static_cast<std::int64_t>(coarse.neighbours.size());
-          coarse.neighbours.push_back(other);
-          coarse.edge_weights.push_back(0);
-        }
-        coarse.edge_weights[static_cast<std::size_t>(known)] += fine.edge_weights[j];
+        if (other != c) add(other, fine.edge_weights[j]);
       }
     }
     coarse.start.push_back(static_cast<std::int64_t>(coarse.neighbours.size()));

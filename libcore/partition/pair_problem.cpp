@@ -115,7 +115,7 @@ class Pass {
     const auto from = static_cast<std::size_t>(p_.sides[at(v)]);
     p_.loads[from] -= p_.weights[at(v)];
     p_.loads[1 - from] += p_.weights[at(v)];
-    p_.sides[at(v)] = static_cast<signed char>(1 - from);
+    p_.sides[at(v)] = static_cast<std::uint8_t>(1 - from);
   }
 
   void move(LocalId v) {
@@ -143,7 +143,7 @@ class Pass {
 }  // namespace
 
 LocalId refine_pair(PairProblem& problem, int passes, int stall) {
-  const std::vector<signed char> before = problem.sides;
+  const std::vector<std::uint8_t> before = problem.sides;
   for (int pass = 0; pass < passes; ++pass) {
     if (!Pass(problem, stall).run()) break;
   }

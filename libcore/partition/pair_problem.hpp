@@ -3,6 +3,7 @@
 /// Two parts and the vertices along their common border: the serial heart of the refinement.
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace malleus {
 /// A band of vertices that may change between two parts; everything else stays. Side 0 is the first part, 1 the second.
 struct PairProblem {
   std::vector<Real> weights;                 ///< [vertex]
-  std::vector<signed char> sides;            ///< [vertex] 0 or 1
+  std::vector<std::uint8_t> sides;           ///< [vertex] 0 or 1
   std::vector<std::array<Real, 2>> outside;  ///< [vertex] edge weights to vertices of each side outside the band
   std::vector<Real> third;                   ///< [vertex] cost saved with all other parts by going from side 0 to 1
   std::vector<std::int64_t> start;           ///< [vertex + 1]

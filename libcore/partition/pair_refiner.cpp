@@ -327,7 +327,7 @@ std::vector<PairRefiner::Answer> PairRefiner::solve(const PieceLists& pieces, st
     problem.loads = {loads_[static_cast<std::size_t>(goal.p)], loads_[static_cast<std::size_t>(goal.q)]};
     problem.aims = goal.aims;
     problem.slack = goal.slack;
-    const std::vector<signed char> before = problem.sides;
+    const std::vector<std::uint8_t> before = problem.sides;
     if (refine_pair(problem, settings.inner_passes, settings.stall) == 0) continue;
     for (std::size_t v = 0; v < before.size(); ++v) {
       if (before[v] != problem.sides[v]) answers.push_back({numbers[v], problem.sides[v] == 0 ? goal.p : goal.q});

@@ -9,7 +9,7 @@ import time
 import h5py
 import small_meshes
 from channel_case import AIR, CHANNEL, channel_mesh
-from runs import BIN, LAUNCH
+from runs import BIN, LAUNCH, PATIENCE
 
 UPSETTING = """[mesh]
 file = box.msh
@@ -141,7 +141,7 @@ def rows_so_far(output):
 
 def wait_for_rows(process, output, rows, seconds=120):
     """Until history.csv has so many rows; False where the process ended before."""
-    limit = time.monotonic() + seconds
+    limit = time.monotonic() + seconds * PATIENCE
     while rows_so_far(output) < rows:
         if process.poll() is not None:
             return False
@@ -155,7 +155,7 @@ def wait_for_rows(process, output, rows, seconds=120):
 def finish(process, seconds=240):
     """Exit code and what was said; a process that hangs is an error."""
     try:
-        said, complaints = process.communicate(timeout=seconds)
+        said, complaints = process.communicate(timeout=seconds * PATIENCE)
     except subprocess.TimeoutExpired:
         process.kill()
         raise AssertionError(f"{process.args} did not end within {seconds} s") from None
@@ -219,7 +219,7 @@ def kill(process, program, which, random):
 def wait_for_writing(process, output, seconds=60):
     """Until a checkpoint is being written; False where the process ended before."""
     directory = pathlib.Path(output) / "checkpoints"
-    limit = time.monotonic() + seconds
+    limit = time.monotonic() + seconds * PATIENCE
     while process.poll() is None and time.monotonic() < limit:
         try:
             if any(name.startswith("unfinished") for name in os.listdir(directory)):

@@ -9,13 +9,14 @@ import unittest
 import h5py
 
 import small_meshes
+from runs import PATIENCE
 
 MESHTOOL = pathlib.Path(os.environ["MALLEUS_BIN"]) / "meshtool"
 
 
 def meshtool(*words, ranks=1):
     launch = ["mpiexec", "-n", str(ranks)] if ranks > 1 else []
-    return subprocess.run([*launch, MESHTOOL, *map(str, words)], capture_output=True, text=True, timeout=120)
+    return subprocess.run([*launch, MESHTOOL, *map(str, words)], capture_output=True, text=True, timeout=120 * PATIENCE)
 
 
 class Files(unittest.TestCase):

@@ -9,7 +9,7 @@ import unittest
 
 import small_meshes
 from channel_case import AIR, CHANNEL, channel_mesh
-from runs import history, run
+from runs import PATIENCE, history, run
 
 FORGE = pathlib.Path(os.environ["MALLEUS_BIN"]) / "forge"
 
@@ -51,7 +51,7 @@ class Remeshing(unittest.TestCase):
         case.write_text(CASE.format(stroke=stroke, zero="0" if dim == 2 else "0 0") + remesh)
         launch = ["mpiexec", "-n", str(ranks)] if ranks > 1 else []
         result = subprocess.run([*launch, FORGE, "--quiet", "-o", self.folder / name, *words, case],
-                                capture_output=True, text=True, timeout=240)
+                                capture_output=True, text=True, timeout=240 * PATIENCE)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         with open(self.folder / name / "history.csv") as file:
             return [{key: float(value) for key, value in row.items() if value} for row in csv.DictReader(file)]

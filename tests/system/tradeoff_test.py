@@ -9,6 +9,8 @@ import subprocess
 import tempfile
 import unittest
 
+from runs import PATIENCE
+
 SOURCE = pathlib.Path(os.environ["MALLEUS_SOURCE"])
 BINARIES = pathlib.Path(os.environ["MALLEUS_BIN"])
 CHANNEL = SOURCE / "cases" / "channel"
@@ -17,7 +19,7 @@ PRESSURE = 12 * VISCOSITY * SPEED / HEIGHT ** 2 * LENGTH  # of the gate: the pro
 
 
 def run(command):
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300)
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300 * PATIENCE)
 
 
 class Folder(unittest.TestCase):

@@ -5,6 +5,8 @@ import subprocess
 import tempfile
 import unittest
 
+from runs import PATIENCE
+
 BIN = pathlib.Path(os.environ["MALLEUS_BIN"])
 SOURCE = pathlib.Path(os.environ["MALLEUS_SOURCE"])
 PROGRAMS = [name for name in ("forge", "inject") if (BIN / name).exists()]
@@ -84,7 +86,7 @@ def run(program, *arguments, ranks=1, cwd=None):
     command = [str(BIN / program), *map(str, arguments)]
     if ranks > 1:
         command = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-n", str(ranks), *command]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120 * PATIENCE)
 
 
 def errors_of(result):
