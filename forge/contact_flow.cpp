@@ -14,12 +14,11 @@ namespace {
 
 constexpr int most_searches = 4;  ///< of contact points in one solve, where tools are curved
 constexpr std::array<Real, 2> guess_tolerances = {3e-2, 1e-3};
-constexpr int most_passes = 12;         ///< of augmentation and friction limits
-constexpr int most_plans = 25;          ///< of a hydraulic press
+constexpr int most_passes = 12;  ///< of augmentation and friction limits
+/// Of the rate at which bodies strain, that their volumes are given back.
+constexpr Real largest_volume_share = 5e-2;
 constexpr int tries_before_picard = 3;  ///< of an increment, each with half the step
 constexpr int most_picard_steps = 400;
-/// A step of a blow may be so many times as long as the force of the increment allows.
-constexpr Real tolerated_excess = 1.2;
 /// A node may end this share of an edge deeper in a tool than its linearised gap says.
 constexpr Real tolerated_surprise = 0.02;
 
@@ -137,6 +136,7 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
   stage.before.assign(velocity.begin(), velocity.end());
   if (const Outcome outcome = solve_under_presses(stage); outcome.kind != Outcome::Kind::done) return outcome;
 
+  if (const Outcome outcome = check_room(increment.start()); outcome.kind != Outcome::Kind::done) return outcome;
   if (const Outcome outcome = check_blows(increment.dt); outcome.kind != Outcome::Kind::done) return outcome;
   if (keeps_stress_) compute_stress(scene_, scene_.fields[field_name::stress].values());
   const Displacement& way = stage.displacement;
@@ -148,19 +148,11 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
   for (std::size_t e = 0; e < strain_rate.size(); ++e) {
     scene_.step_strain_rate[e] = std::max(0.0, way.now * strain_rate[e] + way.before * last_rate[e]);
   }
-  if (scheme == TimeScheme::runge_kutta_2 && scene_.progress.was_pushed) return run_midpoint(increment, stage);
-  return Outcome::done();
-}
-
-/// A blow must not spend energy that it does not have: the force of this increment may exceed the last one's by far.
-Outcome ContactFlow::check_blows(Real dt) const {
-  for (std::size_t t = 0; t < scene_.tools.size(); ++t) {
-    const Tool& tool = scene_.tools[t];
-    const Real limit = tool.press().step_limit(tool.resistance(report_.tool_forces[t]));
-    if (dt > tolerated_excess * limit) {
-      return Outcome::retry(fmt::format("the blow of {} would spend too much of its energy", tool.name()), limit);
-    }
-  }
+  displacement_ = way;
+  if (scheme == TimeScheme::adams_bashforth_2 && way.before == 0) scheme = TimeScheme::runge_kutta_2;
+  const bool halts = any_press([&](const Press& press) { return press.is_stalled(increment.start()); });
+  if (scheme == TimeScheme::runge_kutta_2 && scene_.progress.was_pushed && !halts)
+    return run_midpoint(increment, stage);
   return Outcome::done();
 }
 
@@ -204,23 +196,6 @@ Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first
   return Outcome::done();
 }
 
-/// Presses with a force limit change their speed until force and speed agree.
-Outcome ContactFlow::solve_under_presses(const Stage& stage) {
-  const Real tolerance = std::max(10 * scene_.solver.newton_tolerance, 1e-6);
-  for (int plan = 0; plan < most_plans; ++plan) {
-    for (Tool& tool : scene_.tools) tool.plan(stage.start_time, stage.displacement);
-    if (const Outcome outcome = solve(stage); outcome.kind != Outcome::Kind::done) return outcome;
-    bool accepted = true;
-    for (std::size_t t = 0; t < scene_.tools.size(); ++t) {
-      Tool& tool = scene_.tools[t];
-      const Real resistance = tool.resistance(report_.tool_forces[t]);
-      accepted = tool.press().accepts(resistance, stage.start_time, tolerance) && accepted;
-    }
-    if (accepted) return Outcome::done();
-  }
-  return Outcome::retry("a press found no speed at which its force limit holds");
-}
-
 Outcome ContactFlow::solve(const Stage& stage) {
   const FreeSurface surface(*scene_.comm, scene_.mesh, scene_.geometry, scene_.boundaries->is_free());
   state_.nodes.resize(static_cast<std::size_t>(scene_.mesh.nodes()) * static_cast<std::size_t>(scene_.dim() + 1));
@@ -254,8 +229,7 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
     prepare_operator(stage);
     if (const Outcome outcome = guess_limits(stage, surface); outcome.kind != Outcome::Kind::done) return outcome;
     for (int pass = 0;; ++pass) {
-      if (const Outcome outcome = run_newton(scene_.solver.newton_tolerance); outcome.kind != Outcome::Kind::done)
-        return outcome;
+      if (const Outcome outcome = run_newton(tolerance_); outcome.kind != Outcome::Kind::done) return outcome;
       if (!update_contacts(stage, surface, pass)) break;
       if (pass == most_passes) return Outcome::retry("the contact pressures did not settle");
     }
@@ -269,7 +243,7 @@ Outcome ContactFlow::solve_contacts(const Stage& stage, const FreeSurface& surfa
 Outcome ContactFlow::guess_limits(const Stage& stage, const FreeSurface& surface) {
   if (!has_limited_friction()) return Outcome::done();
   for (const Real tolerance : guess_tolerances) {
-    if (tolerance <= scene_.solver.newton_tolerance) break;
+    if (tolerance <= tolerance_) break;
     if (const Outcome outcome = run_newton(tolerance); outcome.kind != Outcome::Kind::done) return outcome;
     measure_contacts(stage, surface);
     if (!update_friction(surface)) break;
@@ -374,7 +348,7 @@ void ContactFlow::rest() {
 
 void ContactFlow::prepare_operator(const Stage& stage) {
   StokesLoads loads = scene_.boundaries->loads(stage.time);
-  volume_targets(stage.displacement, loads);
+  volume_targets(stage, loads);
   operator_->set_constraints(scene_.boundaries->constraints(stage.time));
   operator_->set_loads(std::move(loads));
   std::vector<ResidualTerm*> terms;
@@ -384,22 +358,39 @@ void ContactFlow::prepare_operator(const Stage& stage) {
   operator_->impose_constraints(state_);
 }
 
+/// Speed of what drives the bodies now, m/s: a press at its force limit may stand still.
+Real ContactFlow::driving_speed(Real time) const {
+  if (scene_.boundaries->has_loads()) return scene_.scale.speed;
+  Real speed = scene_.boundaries->largest_speed(time);
+  for (const Tool& tool : scene_.tools) {
+    if (tool.moves()) speed = std::max(speed, tool.velocity_at(tool.start().pivot).norm());
+    if (tool.motion().rotation.squaredNorm() > 0) speed = std::max(speed, scene_.scale.speed);
+  }
+  return speed;
+}
+
 /// Asks each body's lost volume back: the displacement of the increment shall have the volume strain ln(V0 / V), and
-/// besides what this increment is expected to lose by the last one's measure (the schemes' error of third order).
-void ContactFlow::volume_targets(const Displacement& way, StokesLoads& loads) {
+/// besides what this increment is expected to lose by the last one's measure (the schemes' error of third order). Not
+/// faster than a small share of what strains the body, else its forces would show it: a remesh may change more volume
+/// than a short step can give back, and a full die gives none.
+void ContactFlow::volume_targets(const Stage& stage, StokesLoads& loads) {
+  const Displacement& way = stage.displacement;
   const bool by_scheme = scene_.motion.scheme != TimeScheme::euler;
   const VolumeTarget choice = scene_.motion.volume_target;
   if (choice == VolumeTarget::no || (choice == VolumeTarget::automatic && !by_scheme)) return;
   Progress& progress = scene_.progress;
   const Real ratio = progress.last_step > 0 ? way.step / progress.last_step : 0;
+  const Real fastest = largest_volume_share * driving_speed(stage.start_time) / scene_.scale.height;
   std::vector<Real> targets;
   for (std::size_t region = 0; region < scene_.bodies.size(); ++region) {
     const Body& body = scene_.bodies[region];
     Real target = 0;
     if (body.is_deformable() && body.volume > 0) {
       const Real expected = progress.volume_losses[region] * ratio * ratio * ratio;
-      progress.asked_strains[region] = std::log(body.start_volume / body.volume) - expected;
-      target = (progress.asked_strains[region] / way.step - way.before * saved_.targets[region]) / way.now;
+      const Real wanted = std::log(body.start_volume / body.volume) - expected;
+      const Real before = way.before * saved_.targets[region];
+      target = std::clamp((wanted / way.step - before) / way.now, -fastest, fastest);
+      progress.asked_strains[region] = way.step * (way.now * target + before);
     }
     targets.push_back(target);
   }

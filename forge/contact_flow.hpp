@@ -2,6 +2,8 @@
 
 /// The velocity and pressure of the bodies, with what holds and pushes them.
 
+#include <functional>
+
 #include "engine/component.hpp"
 #include "forge/initial_contact.hpp"
 #include "forge/scene.hpp"
@@ -30,6 +32,7 @@ struct FlowReport {
   Real force_imbalance = 0;  ///< sum of the forces that are left over, relative to the largest one
   Real max_penetration = 0;  ///< m, at the end of the increment as the conditions see it
   Real penalty_power = 0;    ///< W, of the contact pressures on what they let through
+  Real lost_power = 0;       ///< W, of those pressures on what the penalties give way, approach left out
   Real residual = 0;         ///< relative, that the last nonlinear solve ended with
   int contacts = 0;          ///< active contact points
 };
@@ -78,6 +81,8 @@ class ContactFlow final : public Component {
   void set_keeps_stress(bool keeps) { keeps_stress_ = keeps; }
   /// Nothing fixed the mean pressure of the last solve.
   bool pressure_is_free() const { return operator_->pressure_is_free(); }
+  /// How the increment ends by the velocity of its solve.
+  const Displacement& displacement() const noexcept { return displacement_; }
   /// Drops what belongs to the old mesh. Collective.
   void mesh_changed();
   /// The same after a remesh, where the fields are interpolated: the next solve starts from the strain rates of the old
@@ -121,10 +126,15 @@ class ContactFlow final : public Component {
 
   void save();
   Outcome run_stages(const Increment& increment);
+  Outcome check_room(Real time) const;
   Outcome check_blows(Real dt) const;
   bool has_turned_elements() const;
   Outcome run_midpoint(const Increment& increment, const Stage& first);
-  Outcome solve_under_presses(const Stage& stage);
+  Outcome solve_under_presses(Stage& stage);
+  bool any_press(const std::function<bool(const Press&)>& is) const;
+  bool accept_forces(Stage& stage, Real tolerance);
+  bool stop_presses(Real time);
+  void start_again(Real time);
   Outcome solve(const Stage& stage);
   Outcome solve_contacts(const Stage& stage, const FreeSurface& surface);
   Prediction predict(const Stage& stage) const;
@@ -137,7 +147,8 @@ class ContactFlow final : public Component {
   std::vector<Real> shear_rates() const;  ///< [element] 1/s, of the strain_rate field
   NewtonOutcome run_newton_once(const NewtonOptions& asked);
   Outcome run_picard(Real tolerance);
-  void volume_targets(const Displacement& displacement, StokesLoads& loads);
+  Real driving_speed(Real time) const;
+  void volume_targets(const Stage& stage, StokesLoads& loads);
 
   /// Slips of the contact points at the solution, and from them pressures, gaps and what is remembered. Whether the
   /// solution asks for another pass (augmentation; limits of friction that moved). Collective.
@@ -176,6 +187,8 @@ class ContactFlow final : public Component {
   bool keeps_stress_ = true;
   bool is_transferred_ = false;  ///< the first guess comes from another mesh
   bool is_cold_ = true;          ///< no solution tells Newton's method where to start
+  Displacement displacement_;
+  Real tolerance_ = 0;  ///< of Newton's method, relative
   GlobalId tried_increment_ = -1;
   int tries_ = 0;  ///< of that increment
   FlowReport report_;

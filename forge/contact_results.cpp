@@ -237,7 +237,7 @@ void ContactFlow::measure_forces() {
 void ContactFlow::measure_powers(std::span<const Real> reactions) {
   const auto dim = static_cast<std::size_t>(scene_.dim());
   const std::size_t opponents = scene_.tools.size() + scene_.pairs.size();
-  std::vector<Real> sums(opponents + 4, 0.0);  // areas; powers imposed, of tools, of contacts, of penalties
+  std::vector<Real> sums(opponents + 5, 0.0);  // areas; powers imposed, of tools, of contacts, of penalties twice
   for (std::size_t i = 0; i < contact_.points().size(); ++i) {
     const ContactPoint& point = contact_.points()[i];
     const ContactTraction& traction = tractions_[i];
@@ -245,6 +245,8 @@ void ContactFlow::measure_powers(std::span<const Real> reactions) {
     sums[opponents + 1] += point.area * traction.traction.dot(point.opponent_velocity);
     sums[opponents + 2] -= point.area * traction.traction.dot(slips_[i]);
     sums[opponents + 3] += point.area * traction.pressure * point.normal.normal.dot(slips_[i]);
+    const Real given = traction.pressure - point.normal.multiplier;
+    if (traction.pressure > 0 && given > 0) sums[opponents + 4] += point.area * given * given / point.normal.penalty;
   }
   for (LocalId node = 0; node < scene_.mesh.owned_nodes() && scene_.progress.was_pushed; ++node) {
     sums[opponents] +=
@@ -256,6 +258,7 @@ void ContactFlow::measure_powers(std::span<const Real> reactions) {
   report_.power.tools = sums[opponents + 1];
   report_.power.contact = sums[opponents + 2];
   report_.penalty_power = sums[opponents + 3];
+  report_.lost_power = sums[opponents + 4];
   report_.power.deformation = 0;
   if (!scene_.progress.was_pushed) return;
   operator_->update_viscosity(state_);

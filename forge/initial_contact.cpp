@@ -12,8 +12,8 @@ namespace {
 constexpr Real none = std::numeric_limits<Real>::max();
 /// Overlaps below this share of an edge come from rounding, of a size that no force shows.
 constexpr Real harmless_overlap = 1e-4;
-/// Gaps between bodies are looked for within this share of the scene's height: from afar a node meets the outer sides of
-/// the other body from behind.
+/// Gaps between bodies are looked for within this share of the scene's height: from afar a node meets the outer sides
+/// of the other body from behind.
 constexpr Real told_share = 0.25;
 /// Overlaps of so many edges look like a tool that is turned the wrong way.
 constexpr Real turned_overlap = 1;

@@ -150,13 +150,10 @@ void Motion::account_volume() {
 
 void Motion::account_strokes(const Increment& increment) {
   Progress& progress = scene_.progress;
-  const Real last_step = progress.last_step;
-  const bool second_order = scene_.motion.scheme == TimeScheme::adams_bashforth_2 && last_step > 0;
-  const Displacement way = second_order ? adams_bashforth_step(increment.dt, last_step) : euler_step(increment.dt);
   for (std::size_t t = 0; t < scene_.tools.size(); ++t) {
     Tool& tool = scene_.tools[t];
     if (!(tool.motion().direction.squaredNorm() > 0)) continue;
-    tool.press().commit(tool.resistance(flow_.report().tool_forces[t]), increment.start(), way);
+    tool.press().commit(tool.resistance(flow_.report().tool_forces[t]), increment.start(), flow_.displacement());
   }
   const Real middle = increment.start() + 0.5 * increment.dt;
   for (std::size_t i = 0; i < progress.boundary_strokes.size(); ++i) {

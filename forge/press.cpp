@@ -20,6 +20,8 @@ constexpr Real share_at_end = 0.36;  // a fifth of the speed
 /// many.
 constexpr Real crawling = 1e-3;
 constexpr int most_bracketed = 8;
+/// So many times its limit tells that a die has closed in the increment.
+constexpr Real overload = 2;
 
 }  // namespace
 
@@ -38,9 +40,7 @@ Press::Press(PressSpec spec) : spec_(std::move(spec)) {
 
 void Press::restore(const PressState& state) {
   state_ = state;
-  slow_.reset();
-  fast_.reset();
-  bracketed_ = 0;
+  forget_trials();
 }
 
 /// Height of the ram above the bottom dead centre at the angle a from it: r (1 - cos a) + l - sqrt(l^2 - r^2 sin^2 a).
@@ -107,44 +107,84 @@ bool Press::accepts(Real force, Real time, Real tolerance) {
   const bool is_limited = state_.allowed_speed < full;
   if (!is_limited && force <= spec_.force_limit * (1 + tolerance)) return true;
   if (is_limited && std::abs(force - spec_.force_limit) <= tolerance * spec_.force_limit) return true;
-  if (!(speed_now > 0) && force > spec_.force_limit) return true;  // it stands still: what it holds is not its doing
-  if (bracketed_ > most_bracketed && speed_now < crawling * full) return true;  // solves are not that sharp
-  (force > spec_.force_limit ? fast_ : slow_) = {speed_now, force};
+  if (holds_still_ && force > spec_.force_limit) return true;  // what it holds is not its doing
+  if (bracketed_ > most_bracketed && std::abs(speed_now) < crawling * full) return true;  // solves are not that sharp
+  if (force > spec_.force_limit) {
+    faster_ = fast_;
+    fast_ = {speed_now, force};
+  } else {
+    slow_ = {speed_now, force};
+  }
   state_.allowed_speed = next_speed(full);
   return false;
 }
 
+void Press::hold_still() {
+  state_.allowed_speed = std::min(state_.allowed_speed, 0.0);
+  holds_still_ = true;
+}
+
+void Press::forget_trials() {
+  slow_.reset();
+  fast_.reset();
+  faster_.reset();
+  bracketed_ = 0;
+  holds_still_ = false;
+}
+
 /// The next speed to try: by the power law through what was tried, kept within the bracket where there is one.
 Real Press::next_speed(Real full) {
-  constexpr Real creeping = 1e-7;  // of the full speed: below it the press stands still
+  constexpr Real creeping = 1e-7;  // of the full speed
   constexpr Real usual_exponent = 0.3;
   const Real limit = spec_.force_limit;
-  if (slow_ && fast_) {
-    const Real width = fast_->speed - slow_->speed;
-    const Real linear = slow_->speed + width * (limit - slow_->force) / (fast_->force - slow_->force);
-    Real guess = linear;
-    if (slow_->speed > 0 && slow_->force > 0) {
-      const Real exponent = std::log(fast_->force / slow_->force) / std::log(fast_->speed / slow_->speed);
-      if (exponent > 0) guess = slow_->speed * std::pow(limit / slow_->force, 1 / exponent);
-    }
-    if (++bracketed_ % 4 == 0) guess = slow_->speed + 0.5 * width;  // one side may be stuck
-    return std::clamp(guess, slow_->speed + 0.02 * width, fast_->speed - 0.02 * width);
-  }
-  if (fast_) {
-    const Real less = fast_->speed * std::clamp(std::pow(limit / fast_->force, 1 / usual_exponent), 1e-3, 0.9);
-    return less > creeping * full ? less : 0;
-  }
+  if (slow_ && fast_) return within_bracket();
+  if (fast_) return slower(full);
   if (!(slow_->force > 0)) return std::numeric_limits<Real>::max();  // nothing resists: full speed
   const Real from = std::max(slow_->speed, creeping * full);
   return from * std::clamp(std::pow(limit / slow_->force, 1 / usual_exponent), 1.1, 1e3);
 }
 
+/// Where a die closes the force jumps within the bracket: halving finds the place. Elsewhere the force follows a power
+/// of the speed.
+Real Press::within_bracket() {
+  const Real limit = spec_.force_limit;
+  const Real width = fast_->speed - slow_->speed;
+  const Real middle = slow_->speed + 0.5 * width;
+  const bool jumps = is_overloaded(fast_->force) && 2 * slow_->force < limit;
+  if (++bracketed_ % 3 == 0 || jumps) return middle;
+  Real guess = slow_->speed + width * (limit - slow_->force) / (fast_->force - slow_->force);
+  if (slow_->speed > 0 && slow_->force > 0) {
+    const Real exponent = std::log(fast_->force / slow_->force) / std::log(fast_->speed / slow_->speed);
+    if (exponent > 0) guess = slow_->speed * std::pow(limit / slow_->force, 1 / exponent);
+  }
+  return std::clamp(guess, slow_->speed + 0.02 * width, fast_->speed - 0.02 * width);
+}
+
+/// All that was tried was too fast: slower by a power law. In a die that is nearly full the force falls
+/// much faster than by any power of the speed, in one that is full linearly, by what the contacts' penalties give way;
+/// a full die may push the press back by a little.
+Real Press::slower(Real full) const {
+  constexpr Real usual_exponent = 0.3;
+  constexpr Real least_share = 0.3;
+  constexpr Real largest_retreat = 0.02;
+  constexpr Real nudge = 1e-5;
+  const Real limit = spec_.force_limit;
+  const bool is_closed = is_overloaded(fast_->force) || fast_->speed < crawling * full;
+  if (is_closed && faster_ && faster_->force > fast_->force) {
+    const Real slope = (faster_->force - fast_->force) / (faster_->speed - fast_->speed);
+    const Real linear = fast_->speed - (fast_->force - limit) / slope;
+    return std::max(std::min(linear, 0.9 * fast_->speed), -largest_retreat * full);
+  }
+  const Real less = fast_->speed * std::clamp(std::pow(limit / fast_->force, 1 / usual_exponent), least_share, 0.9);
+  if (less > crawling * full) return less;
+  return fast_->speed > 0 ? 0 : fast_->speed - nudge * full;
+}
+
 void Press::commit(Real force, Real time, const Displacement& displacement) {
   const Real way = travel(time, displacement);
   state_.stroke += way;
-  slow_.reset();
-  fast_.reset();
-  bracketed_ = 0;
+  forget_trials();
+  if (state_.allowed_speed < 0) state_.allowed_speed = 0;
   if (!has_inertia()) {
     state_.last_speed = speed(time);
     state_.speed = state_.last_speed;
@@ -162,6 +202,14 @@ void Press::commit(Real force, Real time, const Displacement& displacement) {
     state_.stopped = time + (1 + 1e-9) * displacement.step >= spec_.table.times.back();
   }
   state_.last_force = force;
+}
+
+bool Press::is_limited(Real time) const {
+  return spec_.kind == PressKind::hydraulic && state_.allowed_speed < spec_.speed(time);
+}
+
+bool Press::is_overloaded(Real force) const {
+  return spec_.kind == PressKind::hydraulic && force > overload * spec_.force_limit;
 }
 
 bool Press::is_stalled(Real time) const {

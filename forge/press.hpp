@@ -60,10 +60,18 @@ class Press {
   Real travel(Real time, const Displacement& displacement) const;
   /// Hydraulic: whether the force [N] that resists the planned motion agrees with the press to `tolerance` (relative);
   /// else the speed is changed (by a power law between force and speed, within a bracket) and the increment has to be
-  /// solved again. A press that stands still accepts any force. Other presses take any force.
+  /// solved again. A press that holds still accepts any force. Other presses take any force.
   bool accepts(Real force, Real time, Real tolerance);
+  /// Hydraulic: stands still, or goes on back, and takes any force, where no speed was found; until commit().
+  void hold_still();
+  /// Forgets the trials of this increment, whose way from speed to displacement has changed.
+  void forget_trials();
   /// Ends an increment. force: what resists the motion, N. Hammer and screw: m dw/dt = -force, by the nodes' scheme.
   void commit(Real force, Real time, const Displacement& displacement);
+  /// Hydraulic: slower than it would be without its force limit, at a time [s].
+  bool is_limited(Real time) const;
+  /// Hydraulic: the force [N] is far beyond the limit: a die has closed.
+  bool is_overloaded(Real force) const;
   /// Hydraulic: at its force limit it crawls, or stands still, at a time [s].
   bool is_stalled(Real time) const;
   /// The largest step in which a blow's work against the force [N] is a small part of its energy [s].
@@ -72,6 +80,8 @@ class Press {
  private:
   bool has_inertia() const noexcept { return spec_.kind == PressKind::hammer || spec_.kind == PressKind::screw; }
   Real next_speed(Real full);
+  Real within_bracket();
+  Real slower(Real full) const;
   Real crank_drop(Real time) const;  ///< stroke of a crank since time 0
 
   PressSpec spec_;
@@ -81,9 +91,11 @@ class Press {
     Real speed = 0;
     Real force = 0;
   };
-  std::optional<Trial> slow_;  ///< the last with too small a force
-  std::optional<Trial> fast_;  ///< the last with too large a one
-  int bracketed_ = 0;          ///< plans between the two
+  std::optional<Trial> slow_;    ///< the last with too small a force
+  std::optional<Trial> fast_;    ///< the last with too large a one
+  std::optional<Trial> faster_;  ///< the one before
+  bool holds_still_ = false;
+  int bracketed_ = 0;  ///< plans between the two
 };
 
 }  // namespace malleus::forge

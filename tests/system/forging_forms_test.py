@@ -6,6 +6,7 @@ import unittest
 
 from box_msh import BoxMesh
 from forging import K, Forging, box_mesh, flow_stress, vector
+from runs import history, run
 
 
 def scott(radius, height, m, speed=1.0):
@@ -51,22 +52,49 @@ class RigidMotion(Forging):
 
 
 class Cavity(Forging):
+    """Walls that are 2 % away: full where the height has fallen to 1/1.02 (1/1.02^2 in space)."""
+
+    LIMIT = 40 * K
+
+    def scene(self, dim, end, press):
+        # The corner nodes are held by two or three planes.
+        box_mesh(self.directory / "box.msh", dim, cells=(4, 4, 4))
+        up = "0 " * (dim - 1)
+        text = (f"[mesh]\nfile = box.msh\n[time]\n{end}\nstep = 0.005\n[penalty]\npenalty = 1e5\n" + body("billet") +
+                f"[tool.upper]\nshape = plane\npoint = {up}1\nnormal = {up}-1\nvelocity = {up}-1\n{press}"
+                f"[tool.lower]\nshape = plane\npoint = {up}0\nnormal = {up}1\n")
+        for axis in range(dim - 1):
+            text += f"[tool.wall_{'xy'[axis]}]\nshape = plane\npoint = {vector(dim, axis, 1.02)}\nnormal = {vector(dim, axis, -1)}\n"
+            text += f"[boundary.plane_{'xy'[axis]}]\ngroup = billet_{'xy'[axis]}_low\ntype = symmetry\n"
+        return text
+
     def test_a_die_fills_into_its_corners(self):
-        # Walls that are 2 % away: full where the height has fallen to 1/1.02 (1/1.02^2 in space). The corner nodes are
-        # held by two or three planes.
         for dim in (2, 3):
-            box_mesh(self.directory / "box.msh", dim, cells=(4, 4, 4))
-            up = "0 " * (dim - 1)
-            text = ("[mesh]\nfile = box.msh\n[time]\nstroke = 0.1\nstep = 0.005\n" + body("billet") +
-                    f"[tool.upper]\nshape = plane\npoint = {up}1\nnormal = {up}-1\nvelocity = {up}-1\npress = hydraulic\n"
-                    f"force_limit = {40 * K!r}\n[tool.lower]\nshape = plane\npoint = {up}0\nnormal = {up}1\n")
-            for axis in range(dim - 1):
-                text += f"[tool.wall_{'xy'[axis]}]\nshape = plane\npoint = {vector(dim, axis, 1.02)}\nnormal = {vector(dim, axis, -1)}\n"
-                text += f"[boundary.plane_{'xy'[axis]}]\ngroup = billet_{'xy'[axis]}_low\ntype = symmetry\n"
-            rows = self.forge(text)
+            rows = self.forge(self.scene(dim, "stroke = 0.1", f"press = hydraulic\nforce_limit = {self.LIMIT!r}\n"))
             self.assertAlmostEqual(rows[-1]["stroke_upper_m"], 1 - 1.02 ** (1 - dim), delta=1e-5)
             self.assertLess(abs(rows[-1]["volume_change"]), 1e-6)
             self.assertIn("stalled at its force limit", (self.directory / "out" / "run.log").read_text())
+
+    def test_a_full_die_holds_the_press_at_its_limit(self):
+        for dim, ranks in ((2, 1), (3, 1), (3, 3)):
+            rows = self.forge(self.scene(dim, "end = 0.06", f"press = hydraulic\nforce_limit = {self.LIMIT!r}\n"), ranks=ranks)
+            self.assertAlmostEqual(rows[-1]["time_s"], 0.06)
+            for row in rows[-3:]:
+                self.assertAlmostEqual(row[f"force_upper_{'xyz'[dim - 1]}_N"] / self.LIMIT, 1, delta=2e-3)
+                # The pressure is the same all around.
+                self.assertAlmostEqual(abs(row["force_wall_x_x_N"]) / self.LIMIT, 1.02**-dim, delta=5e-3)
+                self.assertAlmostEqual(row["stroke_upper_m"], 1 - 1.02 ** (1 - dim), delta=1e-5)
+                self.assertLess(abs(row["volume_change"]), 1e-6)
+
+    def test_tools_that_go_on_in_a_full_die_end_the_run(self):
+        for dim in (2, 3):
+            case = self.directory / "case.ini"
+            case.write_text(self.scene(dim, "end = 0.06", ""))
+            result = run("forge", case, self.directory / "out", check=False)
+            self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
+            self.assertIn("the die is full", result.stderr)
+            for row in history(self.directory / "out"):
+                self.assertLess(row["force_upper_y_N" if dim == 2 else "force_upper_z_N"], 5 * K)
 
 
 class Stack(Forging):

@@ -47,6 +47,30 @@ TEST(Press, TableIsFollowedThroughItsKinks) {
   EXPECT_NEAR(Press(spec).speed(2), -0.25, 1e-6);
 }
 
+/// A die that closes at some stroke: beyond, the force rises linearly by 4e4 times.
+TEST(Press, HydraulicHoldsItsLimitWhereADieCloses) {
+  const auto force = [](Real stroke, Real speed) {
+    const Real beyond = stroke + 0.01 * speed - 0.5;
+    return std::pow(std::max(speed, 0.0), 0.3) + std::max(0.0, 4e6 * beyond);
+  };
+  const PressSpec spec = {.kind = PressKind::hydraulic, .speed = [](Real) { return 1.0; }, .force_limit = 20};
+  Press press(spec);
+  Real time = 0;
+  int solves = 0;
+  for (int increment = 0; increment < 70; ++increment, time += 0.01) {
+    Real resisting = force(press.state().stroke, press.speed(time));
+    for (++solves; !press.accepts(resisting, time, 1e-3); ++solves) {
+      ASSERT_LT(solves, 200);
+      resisting = force(press.state().stroke, press.speed(time));
+    }
+    press.commit(resisting, time, euler_step(0.01));
+  }
+  EXPECT_NEAR(press.state().stroke, 0.5, 1e-5);
+  EXPECT_NEAR(press.state().last_force, 20, 0.02);
+  EXPECT_TRUE(press.is_stalled(time));
+  EXPECT_LT(solves, 70 + 40);
+}
+
 TEST(Press, CrankComesDownToItsDeadCentre) {
   const PressSpec spec = {
       .kind = PressKind::crank, .crank_radius = 0.1, .rod_length = 0.5, .rotation_speed = 2, .start_height = 0.2};
