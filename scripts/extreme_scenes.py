@@ -56,7 +56,15 @@ class Bench:
 
     def run(self, case, mesh, *settings, ranks=None):
         """(finished process, Run) of a shipped case on a mesh."""
-        path = CASES / case
+        return self.run_case(CASES / case, mesh, *settings, ranks=ranks)
+
+    def run_text(self, text, mesh, *settings, ranks=None):
+        """The same of a case of which this is the text."""
+        path = self.folder / f"case-{self.number}.ini"
+        path.write_text(text)
+        return self.run_case(path, mesh, *settings, ranks=ranks)
+
+    def run_case(self, path, mesh, *settings, ranks=None):
         program = self.binaries / trials.program_of(path.read_text())
         self.number += 1
         output = self.folder / f"out-{self.number}"

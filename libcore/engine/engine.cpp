@@ -33,7 +33,7 @@ constexpr Real first_checkpoint_in_outputs = 2;  ///< time of a checkpoint befor
 
 /// Of solvers and their libraries, beyond what mesh and fields take (measured).
 Real solver_bytes(int dim, Real nodes, int ranks) {
-  return 14e6 * ranks + nodes * (dim == 3 ? 3e3 : 1e3);
+  return dim == 3 ? 6e6 * ranks + 3e3 * nodes : 14e6 * ranks + 1e3 * nodes;
 }
 
 /// Equal shares of a state that was read on another number of ranks than wrote it.
@@ -129,9 +129,10 @@ void Engine::print_outlook() {
   if (!outlook) return;
   const auto nodes = static_cast<Real>(process_.mesh().total_nodes());
   const Real estimates = plan.is_steady() || !process_.solves_again() ? 1 : 2;
-  const Real outputs = outlook->increments / static_cast<Real>(settings_.output_every) + 2;
+  const Real outputs = plan.is_steady() ? 1 : outlook->increments / static_cast<Real>(settings_.output_every) + 2;
   const Real total = spent + outlook->total_s() + estimates * (outlook->making_s + outlook->coarse_s) +
-                     outputs * (output_s * comm_.size() + output_s_per_node * nodes) + checkpoint_s * comm_.size();
+                     outputs * (output_s * comm_.size() + output_s_per_node * nodes) +
+                     (plan.is_steady() ? 0 : checkpoint_s) * comm_.size();
   log::info(
       "rehearsed on coarser meshes: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
       "MiB",

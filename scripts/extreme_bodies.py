@@ -1,0 +1,61 @@
+"""Rows of scripts/extremes: bodies far stiffer than others, next to each other; viscosities that are cut off."""
+import re
+
+import numpy as np
+from box_meshes import Boxes, evenly
+from extreme_scenes import CASES, REFUSED, WRONG, ended_well, first_error, refused, row, upsetting, verdict
+
+CONSISTENCY = 1e6
+
+
+def failure(finished):
+    return first_error(finished), REFUSED if refused(finished) else WRONG
+
+
+def body(name, m=0.3):
+    return f"[body.{name}]\ngroup = {name}\nlaw = norton-hoff\nconsistency = {CONSISTENCY}\nrate_sensitivity = {m}\n"
+
+
+@row("dies 1e4 times as stiff as the billet (m = 0.3: at one stress rates apart by 1e13), press", "the force of rigid dies within 1e-3")
+def stiff_dies(bench):
+    text, mesh, forces = (CASES / "press" / "case.ini").read_text(), bench.mesh("press", "--size", "5", "--die-size", "10"), []
+    rigid = re.sub(r"(\[body\.(?:upper|lower)\]\ngroup = \w+\n)law = .*\nconsistency = .*\nrate_sensitivity = .*\n", r"\1law = rigid\n", text)
+    for case in (text.replace("consistency = 17920 MPa", "consistency = 1792000 MPa"), rigid):
+        finished, run = bench.run_text(case, mesh, "time.increments=2", "accuracy.two_meshes=no")
+        if not ended_well(finished):
+            return failure(finished)
+        forces.append(abs(run.history["force_lower_z_N"][-1]))
+    return f"force {forces[0] / forces[1] - 1:+.1e}", verdict(abs(forces[0] / forces[1] - 1) < 1e-3)
+
+
+@row("two blocks 1e-6 of their height apart, touching, overlapping by as much", "the force of the closed form within 0.5 %")
+def near_bodies(bench):
+    errors = []
+    for distance in (1e-6, 0.0, -1e-6):
+        boxes = Boxes()
+        boxes.add("lower", evenly(0, 1, 4), evenly(0, 1, 4))
+        boxes.add("upper", evenly(0, 1, 6), evenly(1 + distance, 2 + distance, 6))
+        text = "[mesh]\nfile = near.msh\n[time]\nincrements = 2\nstep = 0.01\n" + body("lower") + body("upper")
+        text += "".join(f"[boundary.{name}_x]\ngroup = {name}_x_low\ntype = symmetry\n" for name in ("lower", "upper"))
+        text += ("[boundary.top]\ngroup = upper_y_high\nvelocity = free -2\n[boundary.bottom]\ngroup = lower_y_low\nvelocity = free 0\n"
+                 "[contact.middle]\nslave = upper\nmaster = lower\n")
+        finished, run = bench.run_text(text, boxes.write(bench.folder / "near.msh"), "accuracy.two_meshes=no")
+        if not ended_well(finished):
+            return failure(finished)
+        height = 2 - 2 * 0.01
+        known = 2 * CONSISTENCY * (2 * 2 / height) ** 0.3 * 2 / height
+        errors.append(abs(run.history["force_top_y_N"][-1]) / known - 1)
+    return "force " + ", ".join(f"{e:+.1e}" for e in errors), verdict(max(map(abs, errors)) < 5e-3)
+
+
+@row("cut-off of the strain rate 1e-3 to 1e-1 of the mean rate", "the force changes as its square, by 0.4 % at 1e-1")
+def cut_offs(bench):
+    forces = []
+    for cut_off in (1e-4, 1e-3, 1e-2, 1e-1):
+        finished, history, _ = upsetting(bench, f"solver.cutoff_strain_rate={cut_off}", "time.increments=1", "solver.newton_tolerance=1e-8",
+                                         "solver.linear_tolerance=1e-10", "penalty.penalty=1e6")
+        if not ended_well(finished):
+            return failure(finished)
+        forces.append(abs(history["force_upper_y_N"][0]))
+    changes = np.array(forces[1:]) / forces[0] - 1
+    return ", ".join(f"{c:+.1e}" for c in changes), verdict(abs(changes[0]) < 2e-6 and abs(changes[1]) < 6e-5 and abs(changes[2]) < 4e-3)
