@@ -14,7 +14,7 @@ struct PreconditionerSettings {
   VelocityMethod velocity = VelocityMethod::multigrid;
   CoarseModes modes = CoarseModes::automatic;            ///< automatic: rigid above a viscosity contrast of 30
   CyclePrecision precision = CyclePrecision::automatic;  ///< automatic: double above a contrast of 1e6
-  Real threshold = 0.25;                                 ///< of strong couplings on the finest level
+  Real threshold = 0.25;                                 ///< of strong couplings
   int chebyshev_steps = 3;
   bool positive = false;  ///< block diagonal and positive, for methods that need it
 

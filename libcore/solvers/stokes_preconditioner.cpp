@@ -57,6 +57,7 @@ StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const Pre
   const LinearSystem& system = op.system();
   pressure_ = std::make_unique<PressureBlock>(system, blocks_, settings_.chebyshev_steps);
   lubrication_ = LubricationBlock::make_where_thin(op, blocks_);
+  find_pockets(system);
   blocks_.pressure = {};
   pressure_residual_.assign(index(blocks_.graph.rows()), 0.0F);
   pressure_correction_.assign(index(blocks_.layout.size()), 0.0F);
@@ -72,23 +73,44 @@ StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const Pre
     multigrid.threshold = settings_.threshold;
     velocity_ = make_velocity_multigrid(*system.comm, std::move(finest), *system.constraints, multigrid);
   }
-  find_pockets(system);
   make_border_block();
+}
+
+/// [pocket] e_k^T C e_k, in the blocks' scaling, by the entries that lead out of the pocket: rows of C sum up to zero,
+/// and those inside would leave their rounding.
+std::vector<Real> StokesPreconditioner::pocket_compliance(std::size_t count) const {
+  std::vector<Real> sums(count, 0.0);
+  for (const std::vector<GlobalId>& pocket_of : pocket_of_node_) {
+    for (LocalId row = 0; row < blocks_.graph.rows(); ++row) {
+      const GlobalId pocket = pocket_of[index(row)];
+      if (pocket < 0) continue;
+      for (LocalId k = blocks_.graph.offsets[index(row)]; k < blocks_.graph.offsets[index(row) + 1]; ++k) {
+        if (pocket_of[index(blocks_.graph.columns[index(k)])] == pocket) continue;
+        sums[static_cast<std::size_t>(pocket)] -= static_cast<Real>(blocks_.pressure[index(k)]);
+      }
+    }
+  }
+  operator_->system().comm->sum_in_place(std::span(sums));
+  return sums;
 }
 
 void StokesPreconditioner::find_pockets(const LinearSystem& system) {
   const SoftPockets pockets = find_soft_pockets(system);
   open_regions_ = pockets.open;
   if (pockets.count() == 0) return;
+  for (const std::vector<std::int32_t>* of_node : {&pockets.of_node, &pockets.part}) {
+    std::vector<GlobalId>& labels = pocket_of_node_.emplace_back(index(blocks_.layout.size()), -1);
+    std::copy(of_node->begin(), of_node->end(), labels.begin());
+    blocks_.layout.halo.update_copies(std::span(labels), 1);
+  }
   // A sphere in an unbounded fluid has 0.75 V/eta; anything from that to ten times as much serves.
   constexpr Real factor = 1.5;
   const Real scale = system.pressure_scale * system.pressure_scale * blocks_.scaling;
+  const std::vector<Real> compliance = pocket_compliance(pockets.volume.size());
   for (std::size_t k = 0; k < pockets.volume.size(); ++k) {
-    pocket_weights_.push_back(pockets.outside_viscosity[k] / (factor * scale * pockets.volume[k]));
+    const Real outside = factor * scale * (pockets.volume[k] / pockets.outside_viscosity[k] + pockets.rim[k]);
+    pocket_weights_.push_back(1 / (outside + std::max(compliance[k], 0.0)));
   }
-  pocket_of_node_.assign(index(blocks_.layout.size()), -1);
-  std::copy(pockets.of_node.begin(), pockets.of_node.end(), pocket_of_node_.begin());
-  blocks_.layout.halo.update_copies(std::span(pocket_of_node_), 1);
 }
 
 /// Adds the pockets' constants to the pressure's correction, copies included.
@@ -97,15 +119,19 @@ void StokesPreconditioner::add_pockets(const Real* residual) {
   const auto dim = index(operator_->system().mesh->dim);
   const Real sign = settings_.positive ? 1.0 : -1.0;
   std::vector<Real> sums(pocket_weights_.size(), 0.0);
-  for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
-    const GlobalId pocket = pocket_of_node_[node];
-    if (pocket >= 0) sums[static_cast<std::size_t>(pocket)] += sign * residual[node * (dim + 1) + dim];
+  for (const std::vector<GlobalId>& pocket_of : pocket_of_node_) {
+    for (std::size_t node = 0; node < index(blocks_.graph.rows()); ++node) {
+      if (pocket_of[node] < 0) continue;
+      sums[static_cast<std::size_t>(pocket_of[node])] += sign * residual[node * (dim + 1) + dim];
+    }
   }
   operator_->system().comm->sum_in_place(std::span(sums));
-  for (std::size_t node = 0; node < pocket_of_node_.size(); ++node) {
-    if (pocket_of_node_[node] < 0) continue;
-    const auto pocket = static_cast<std::size_t>(pocket_of_node_[node]);
-    pressure_correction_[node] += static_cast<float>(sums[pocket] * pocket_weights_[pocket]);
+  for (const std::vector<GlobalId>& pocket_of : pocket_of_node_) {
+    for (std::size_t node = 0; node < pocket_of.size(); ++node) {
+      if (pocket_of[node] < 0) continue;
+      const auto pocket = static_cast<std::size_t>(pocket_of[node]);
+      pressure_correction_[node] += static_cast<float>(sums[pocket] * pocket_weights_[pocket]);
+    }
   }
 }
 

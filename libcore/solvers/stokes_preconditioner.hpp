@@ -19,10 +19,10 @@ namespace malleus {
 PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSystem& system);
 
 /// z_p = -(S^-1 + sum_k e_k e_k^T / E_k) r_p, z_q = E^-1 r_q, z_v = A^-1 (r_v - B^T z_p - g z_q): A^-1 one multigrid
-/// cycle, S = M(1/eta)/2 + C by Chebyshev steps, E = d - g^T A^-1 g; e_k is 1 on the nodes of closed soft pocket k, E_k
-/// = 1.5 V_k/eta. Where walls make long thin sections, (z_p, z_q) also has the part of LubricationBlock. With the exact
-/// blocks a Krylov method would need a few iterations; it needs 25-30 with these, at any mesh size. Holds no reference
-/// to the system it was made from.
+/// cycle, S = M(1/eta)/2 + C by Chebyshev steps, E = d - g^T A^-1 g; e_k is 1 on the nodes of closed soft pocket k (or
+/// a part of one), E_k = 1.5 (V_k/eta + the same of the elements around it) + e_k^T C e_k. Where walls make long thin
+/// sections, (z_p, z_q) also has the part of LubricationBlock. With the exact blocks a Krylov method would need a few
+/// iterations; it needs 25-30 with these, at any mesh size. Holds no reference to the system it was made from.
 class StokesPreconditioner {
  public:
   /// settings: resolved. Collective.
@@ -38,6 +38,7 @@ class StokesPreconditioner {
 
  private:
   void find_pockets(const LinearSystem& system);
+  std::vector<Real> pocket_compliance(std::size_t count) const;
   void add_pockets(const Real* residual);
   void make_border_block();
   Eigen::VectorXd solve_pressures(const Real* residual);
@@ -52,8 +53,9 @@ class StokesPreconditioner {
   std::unique_ptr<LubricationBlock> lubrication_;  ///< null where there are no long thin sections
   std::unique_ptr<VelocityMultigrid> velocity_;
   Eigen::MatrixXd border_inverse_;
-  std::vector<Real> pocket_weights_;      ///< [pocket] 1/E of its constant pressure, in the blocks' scaling
-  std::vector<GlobalId> pocket_of_node_;  ///< [node], with copies; -1 = none; empty without pockets
+  std::vector<Real> pocket_weights_;  ///< [pocket] 1/E of its constant pressure, in the blocks' scaling
+  /// [0: pockets, 1: parts of pockets][node], with copies; -1 = none; empty without pockets
+  std::vector<std::vector<GlobalId>> pocket_of_node_;
   int open_regions_ = 0;
   std::vector<float> pressure_residual_;    ///< [owned node]
   std::vector<float> pressure_correction_;  ///< [node], with copies

@@ -87,6 +87,19 @@ void upper_residual(const SweepMatrix<T>& matrix, const T* x, T* residual) {
   }
 }
 
+template <int B, class T>
+void subtract_rows(const SweepMatrix<T>& matrix, const T* x, T* b) {
+  using K = Column<T, B>;
+  const BlockGraph& graph = *matrix.graph;
+  for (LocalId row = 0; row < graph.rows(); ++row) {
+    Sum<T, B> rest(K::load_vector(b + index(row) * B));
+    for (LocalId k = graph.offsets[index(row)]; k < graph.offsets[index(row) + 1]; ++k) {
+      rest.subtract(matrix.values->at(k), x + index(graph.columns[index(k)]) * B);
+    }
+    K::store(rest.total(), b + index(row) * B);
+  }
+}
+
 /// x_row += D^-1 (b - A x)_row, for all rows in increasing order.
 template <int B, class T>
 void relax_forward(const SweepMatrix<T>& matrix, const T* b, T* x) {
@@ -156,6 +169,11 @@ void residual_after_forward(const SweepMatrix<T>& matrix, const T* x, T* residua
 }
 
 template <class T>
+void subtract_product(const SweepMatrix<T>& matrix, const T* x, T* b) {
+  with_block(matrix.values->rows, [&](auto block) { subtract_rows<block>(matrix, x, b); });
+}
+
+template <class T>
 void sweep_backward(const SweepMatrix<T>& matrix, const T* b, T* x) {
   with_block(matrix.values->rows, [&](auto block) { relax_backward<block>(matrix, b, x); });
 }
@@ -180,6 +198,8 @@ template void sweep_forward_from_zero(const SweepMatrix<float>&, const float*, f
 template void sweep_forward_from_zero(const SweepMatrix<double>&, const double*, double*);
 template void residual_after_forward(const SweepMatrix<float>&, const float*, float*);
 template void residual_after_forward(const SweepMatrix<double>&, const double*, double*);
+template void subtract_product(const SweepMatrix<float>&, const float*, float*);
+template void subtract_product(const SweepMatrix<double>&, const double*, double*);
 template void sweep_backward(const SweepMatrix<float>&, const float*, float*);
 template void sweep_backward(const SweepMatrix<double>&, const double*, double*);
 template void sweep_forward(const SweepMatrix<float>&, const float*, float*);

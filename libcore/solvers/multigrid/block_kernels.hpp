@@ -24,6 +24,10 @@ void sweep_forward_from_zero(const SweepMatrix<T>& matrix, const T* b, T* x);
 template <class T>
 void residual_after_forward(const SweepMatrix<T>& matrix, const T* x, T* residual);
 
+/// b -= A x on the owned rows; x with its copies.
+template <class T>
+void subtract_product(const SweepMatrix<T>& matrix, const T* x, T* b);
+
 /// One backward Gauss-Seidel sweep on the owned part; copies of x stay as they are.
 template <class T>
 void sweep_backward(const SweepMatrix<T>& matrix, const T* b, T* x);

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "base/index.hpp"
 #include "solvers/multigrid/block_kernels.hpp"
@@ -23,6 +24,7 @@ struct CycleLevel {
   BlockGraph prolongator;
   BlockValues<T> prolongator_values;
   std::vector<T> b, x, residual, coarse;
+  std::vector<T> first;  ///< correction of the first of two visits; empty where there is but one
 
   SweepMatrix<T> matrix() const { return {&graph, &values, inverses.data()}; }
 };
@@ -81,7 +83,6 @@ class SmoothedAggregation final : public VelocityMultigrid {
       : comm_(comm), settings_(settings), dim_(finest.values.rows) {
     MultigridLevel level = std::move(finest);
     const NodeConstraints* fine_constraints = constraints;
-    Real threshold = settings.threshold;
     while (true) {
       summarize(level);
       invert_diagonals(level);
@@ -89,12 +90,11 @@ class SmoothedAggregation final : public VelocityMultigrid {
       MultigridLevel next;
       Prolongator prolongator;
       const bool goes_on = !is_small && static_cast<int>(summary_.size()) < settings.max_levels &&
-                           coarsen(level, threshold, fine_constraints, next, prolongator);
+                           coarsen(level, fine_constraints, next, prolongator);
       if (!goes_on) break;
       keep(level, std::move(prolongator));
       level = std::move(next);
       fine_constraints = nullptr;
-      threshold /= 2;
     }
     coarsest_ = std::make_unique<CoarsestSolver<T>>(comm, std::move(level));
   }
@@ -122,8 +122,9 @@ class SmoothedAggregation final : public VelocityMultigrid {
   std::size_t bytes() const override {
     std::size_t sum = 0;
     for (const CycleLevel<T>& level : levels_) {
-      sum += sizeof(T) * (level.values.values.size() + level.inverses.size() + level.prolongator_values.values.size() +
-                          level.b.size() + level.x.size() + level.residual.size() + level.coarse.size());
+      sum += sizeof(T) *
+             (level.values.values.size() + level.inverses.size() + level.prolongator_values.values.size() +
+              level.b.size() + level.x.size() + level.residual.size() + level.coarse.size() + level.first.size());
       sum += sizeof(LocalId) * (level.graph.columns.size() + 2 * level.graph.offsets.size() +
                                 level.prolongator.columns.size() + level.prolongator.offsets.size());
     }
@@ -147,10 +148,11 @@ class SmoothedAggregation final : public VelocityMultigrid {
   }
 
   /// False where aggregation no longer makes the level clearly smaller.
-  bool coarsen(MultigridLevel& level, Real threshold, const NodeConstraints* constraints, MultigridLevel& next,
+  bool coarsen(MultigridLevel& level, const NodeConstraints* constraints, MultigridLevel& next,
                Prolongator& prolongator) {
     if (level.left_out.empty()) level.left_out.assign(index(level.graph.rows()), false);
-    const Aggregates aggregates = aggregate(level.layout, level.graph, level.values, dim_, threshold, level.left_out);
+    const Aggregates aggregates =
+        aggregate(level.layout, level.graph, level.values, dim_, settings_.threshold, level.left_out);
     const GlobalId total = comm_.sum(static_cast<GlobalId>(aggregates.count));
     if (total == 0 || 10 * total > 8 * summary_.back().nodes) return false;
     estimate_largest_eigenvalue(comm_, level);
@@ -178,6 +180,7 @@ class SmoothedAggregation final : public VelocityMultigrid {
     const auto block = static_cast<std::size_t>(kept.values.rows);
     kept.b.assign(index(kept.layout.owned()) * block, T(0));
     kept.residual = kept.b;
+    if (is_visited_twice(levels_.size() - 1)) kept.first = kept.b;
     kept.x.assign(index(kept.layout.size()) * block, T(0));
     kept.coarse.assign(index(kept.coarse_layout.size()) * static_cast<std::size_t>(kept.prolongator_values.columns),
                        T(0));
@@ -194,6 +197,22 @@ class SmoothedAggregation final : public VelocityMultigrid {
   std::vector<T>& right_side_of(std::size_t l) { return l < levels_.size() ? levels_[l].b : coarsest_->right_side(); }
   const std::vector<T>& solution_of(std::size_t l) const {
     return l < levels_.size() ? levels_[l].x : coarsest_->solution();
+  }
+
+  /// Of the levels kept, the last of which is above the coarsest. Twice: the first two below the finest, where that
+  /// takes off what makes iterations grow with the mesh and costs little; further down it would cost messages alone.
+  static bool is_visited_twice(std::size_t l) { return l == 1 || l == 2; }
+
+  /// Leaves the correction of level l in its x. Two cycles are still symmetric: 2 M - M A M.
+  void visit(std::size_t l) {
+    cycle(l);
+    if (l >= levels_.size() || !is_visited_twice(l)) return;
+    CycleLevel<T>& level = levels_[l];
+    std::copy_n(level.x.begin(), level.first.size(), level.first.begin());
+    level.layout.halo.update_copies(std::span(level.x), level.values.rows);
+    subtract_product(level.matrix(), level.x.data(), level.b.data());
+    cycle(l);
+    std::transform(level.first.begin(), level.first.end(), level.x.begin(), level.x.begin(), std::plus<>());
   }
 
   /// From levels_[l].b to levels_[l].x.
@@ -213,7 +232,7 @@ class SmoothedAggregation final : public VelocityMultigrid {
     level.coarse_layout.halo.add_to_owners(std::span(level.coarse), modes);
     std::vector<T>& coarse_b = right_side_of(l + 1);
     std::copy_n(level.coarse.begin(), coarse_b.size(), coarse_b.begin());
-    cycle(l + 1);
+    visit(l + 1);
     std::copy_n(solution_of(l + 1).begin(), coarse_b.size(), level.coarse.begin());
     level.coarse_layout.halo.update_copies(std::span(level.coarse), modes);
     add_prolonged(level.prolongator, level.prolongator_values, level.coarse.data(), level.x.data());

@@ -14,7 +14,7 @@ namespace malleus {
 struct MultigridSettings {
   bool rigid_modes = false;         ///< rotations on coarse levels, besides translations
   bool double_precision = false;    ///< of the cycle; the set-up is always in double precision
-  Real threshold = 0.25;            ///< of strong couplings, see aggregate(); halved per level
+  Real threshold = 0.25;            ///< of strong couplings, see aggregate()
   LocalId coarsest_unknowns = 600;  ///< solved directly, on one rank
   LocalId nodes_per_rank = 500;     ///< levels with fewer nodes a rank are gathered onto fewer ranks
   int max_levels = 12;
@@ -28,7 +28,8 @@ struct MultigridLevelSummary {
   int active_ranks = 0;
 };
 
-/// A symmetric V(1,1) cycle of block Gauss-Seidel, between ranks block Jacobi.
+/// A symmetric cycle of block Gauss-Seidel, one sweep before and one after each correction, between ranks block Jacobi;
+/// the first two levels below the finest are visited twice.
 class VelocityMultigrid {
  public:
   virtual ~VelocityMultigrid() = default;

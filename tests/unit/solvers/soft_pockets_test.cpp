@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "solvers/stokes_linear_solver.hpp"
 #include "support/stokes_cavity.hpp"
 #include "support/world.hpp"
@@ -64,6 +66,25 @@ TEST(SoftPockets, CostFewIterationsAtAnyContrast) {
         StokesLinearSolver({.fall_back = false}).solve(scene.system(), scene.right_side(), 1e-6, solution);
     EXPECT_TRUE(outcome.converged);
     EXPECT_LE(outcome.iterations, 1.6 * reference) << "viscosity " << inside;
+  }
+}
+
+/// Small spheres on a coarse mesh, of which many hang together by a node or an edge.
+TEST(SoftPockets, PartsThatTouchByANodeAreDeflatedToo) {
+  const Communicator alone(MPI_COMM_SELF);
+  for (const Communicator* comm : {&alone, &world()}) {
+    LinearVector solution;
+    const test::StokesCavity plain(*comm, soft_spheres({}, 1));
+    const int reference = StokesLinearSolver().solve(plain.system(), plain.right_side(), 1e-6, solution).iterations;
+    const test::StokesCavity scene(*comm, soft_spheres(test::spread_spheres(30, true), 1e-6));
+    const SoftPockets pockets = find_soft_pockets(scene.system());
+    const std::int32_t last = *std::max_element(pockets.of_node.begin(), pockets.of_node.end());
+    EXPECT_GT(pockets.count(), comm->max(GlobalId{last} + 1)) << "there are parts besides the regions";
+    solution = {};
+    const LinearOutcome outcome =
+        StokesLinearSolver({.fall_back = false}).solve(scene.system(), scene.right_side(), 1e-6, solution);
+    EXPECT_TRUE(outcome.converged);
+    EXPECT_LE(outcome.iterations, 1.5 * reference);
   }
 }
 
