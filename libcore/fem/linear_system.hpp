@@ -21,6 +21,14 @@ struct BorderColumn {
   Real diagonal = 0;  ///< <= 0: entry of the unknown's own row (compressible pocket), scaled; same on all ranks
 };
 
+/// Makes the entries of a matrix that is kept by its products alone.
+class MatrixEntries {
+ public:
+  virtual ~MatrixEntries() = default;
+  virtual Mat assemble() = 0;  ///< a BAIJ matrix, valid until release(). Collective.
+  virtual void release() = 0;  ///< frees it
+};
+
 /// Unknowns and equations of a linear solve.
 ///
 ///     [ A   B^T  g ] [dv]   [r_v]      A positive on the free directions (viscous, friction, penalty, inertia)
@@ -30,16 +38,17 @@ struct BorderColumn {
 /// A is symmetric but for convection, which also adds to B^T and B.
 ///
 /// `matrix` holds [A B^T; B -C] in blocks of dim+1 a node, (v_1..v_dim, p): MATSEQBAIJ on one rank, MATMPIBAIJ on
-/// several. Rows and columns are the global node numbers of the mesh; a rank has the rows of the nodes it owns.
-/// Pressures are scaled: the unknowns are p/s and q/s, s = `pressure_scale` [Pa.s/m]; so B, g carry s and C carries
-/// s^2: the dimensionless equations, whose residual weighs force and volume alike on any mesh.
-/// Fixed directions: A = P A' P + (I - P) d, B = B' P (see NodeConstraints), in global axes; right sides and solutions
-/// have no part along them. Nodes that touch no modelled element are fully fixed, with -d in the pressure's row.
+/// several; or a shell, see `entries`. Rows and columns are the global node numbers of the mesh; a rank has the rows of
+/// the nodes it owns. Pressures are scaled: the unknowns are p/s and q/s, s = `pressure_scale` [Pa.s/m]; so B, g carry
+/// s and C carries s^2: the dimensionless equations, whose residual weighs force and volume alike on any mesh. Fixed
+/// directions: A = P A' P + (I - P) d, B = B' P (see NodeConstraints), in global axes; right sides and solutions have
+/// no part along them. Nodes that touch no modelled element are fully fixed, with -d in the pressure's row.
 struct LinearSystem {
   const Communicator* comm = nullptr;
   const Mesh* mesh = nullptr;  ///< for coordinates (rigid modes), elements, halo
   /// Not owned, not to be changed. Beware of MatConvert(): PETSc 3.18 takes an MPIBAIJ matrix apart to convert it.
   Mat matrix = nullptr;
+  MatrixEntries* entries = nullptr;              ///< where the matrix is a shell that knows products alone; else null
   const NodeConstraints* constraints = nullptr;  ///< of the mesh's local nodes: owned, then copies
   std::span<const Real> element_viscosity;       ///< [element] Pa.s; 0 = not modelled, adds nothing to the matrix
   std::span<const Real> element_volume;          ///< [element] m^3; in axisymmetric scenes of the whole ring
@@ -55,6 +64,23 @@ struct LinearSystem {
   std::uint64_t value_version = 0;    ///< changes with the entries
 
   int block_size() const noexcept { return mesh->dim + 1; }
+};
+
+/// The matrix of a system with its entries, which may be made for the lifetime of the object alone.
+class AssembledMatrix {
+ public:
+  explicit AssembledMatrix(const LinearSystem& system)  ///< collective
+      : entries_(system.entries), matrix_(entries_ == nullptr ? system.matrix : entries_->assemble()) {}
+  AssembledMatrix(const AssembledMatrix&) = delete;
+  AssembledMatrix& operator=(const AssembledMatrix&) = delete;
+  ~AssembledMatrix() {
+    if (entries_ != nullptr) entries_->release();
+  }
+  Mat get() const noexcept { return matrix_; }
+
+ private:
+  MatrixEntries* entries_;
+  Mat matrix_;
 };
 
 /// A right side or a solution: owned nodes, and the border unknowns (the same on all ranks).

@@ -290,8 +290,8 @@ void StokesOperator::scale_borders() {
   }
 }
 
-const LinearSystem& StokesOperator::tangent(const StokesState& state, Tangent kind) {
-  if (!scale_is_chosen_) choose_scale();
+void StokesOperator::assemble_matrix(const StokesState& state, Tangent kind) {
+  if (!matrix_) matrix_ = std::make_unique<SystemMatrix>(*comm_, *space_, tuples_);
   matrix_->start();
   with_element(mesh_->dim, geometry_,
                [&]<class Element>(std::type_identity<Element>) { add_element_matrices<Element>(state, kind); });
@@ -301,10 +301,47 @@ const LinearSystem& StokesOperator::tangent(const StokesState& state, Tangent ki
     for (const ResidualTerm* term : terms_) term->add_tangent(*space_, unknowns, sink);
   }
   matrix_->finish(stiffness_);
+}
+
+void StokesOperator::make_matrix_free(const StokesState& state, Tangent kind) {
+  matrix_.reset();
+  linearized_ = state;
+  linearized_kind_ = kind;
+  MatrixFreeCoefficients coefficients{.viscosity = viscosity_,
+                                      .slope = {},
+                                      .state = linearized_.nodes,
+                                      .force = {},
+                                      .follows_subscales = kind == Tangent::newton,
+                                      .pressure_scale = system_.pressure_scale,
+                                      .fixed_stiffness = stiffness_};
+  if (kind != Tangent::picard) coefficients.slope = slope_;
+  if (kind == Tangent::newton) coefficients.force = force_density();
+  products_ = std::make_unique<MatrixFreeTangent>(*comm_, *mesh_, constraints_, std::move(coefficients));
+}
+
+Mat StokesOperator::assemble() {
+  assemble_matrix(linearized_, linearized_kind_);
+  return matrix_->matrix();
+}
+
+void StokesOperator::release() {
+  matrix_.reset();
+}
+
+const LinearSystem& StokesOperator::tangent(const StokesState& state, Tangent kind) {
+  check(space_ != nullptr, "prepare() was called");
+  if (!scale_is_chosen_) choose_scale();
+  products_.reset();
+  if (is_matrix_free()) {
+    make_matrix_free(state, kind);
+  } else {
+    assemble_matrix(state, kind);
+  }
   scale_borders();
   system_.comm = comm_;
   system_.mesh = mesh_;
-  system_.matrix = matrix_->matrix();
+  system_.matrix = products_ ? products_->matrix() : matrix_->matrix();
+  system_.entries = products_ ? this : nullptr;
   system_.constraints = &constraints_;
   system_.element_viscosity = viscosity_;
   system_.element_volume = volume_;

@@ -97,6 +97,17 @@ void MiniElement<D>::add_subscale_slope(const ElementUnknowns<D>& unknowns, cons
   }
 }
 
+template <int D>
+void MiniElement<D>::add_slope_product(const ElementUnknowns<D>& step, const SlopePoint<D>& at,
+                                       ElementUnknowns<D>& product) const {
+  const Eigen::Matrix<Real, D, D> rate = strain_rate(at.state.velocity);
+  const Real work = 2 * at.slope * rate.cwiseProduct(strain_rate(step.velocity)).sum();  // d eta
+  product.velocity += 2 * volume_ * work * (rate * gradients_);
+  if (!at.follows_subscales) return;
+  const Point<D> imbalance = gradients_ * at.state.pressure - at.force;
+  product.pressure += work / (at.viscosity * at.viscosity) * (gradients_.transpose() * (subscale_ * imbalance));
+}
+
 template class MiniElement<2>;
 template class MiniElement<3>;
 

@@ -37,6 +37,16 @@ struct TangentFactors {
   Real scale = 1;
 };
 
+/// Where an element's tangent is taken, for its products with steps.
+template <int D>
+struct SlopePoint {
+  ElementUnknowns<D> state;
+  Point<D> force;  ///< mean, N/m^3
+  Real viscosity = 1;
+  Real slope = 0;
+  bool follows_subscales = false;  ///< with add_subscale_slope()
+};
+
 /// c of the subscales, see MiniElement. (D + 1)^2 / (12 D): 3/8 and 4/9; the bubble alone has 1/20 and 9/420.
 template <int D>
 inline constexpr Real subscale_share = (D + 1.0) * (D + 1.0) / (12.0 * D);
@@ -84,6 +94,8 @@ class MiniElement {
   /// pressures -integral grad q . T (f - grad p) (d eta / eta), d eta = slope 2 eps(v):eps(dv).
   void add_subscale_slope(const ElementUnknowns<D>& unknowns, const ElementLoad<D>& load, const TangentFactors& factors,
                           ElementMatrix<D>& result) const;
+  /// Adds what a slope adds to the product of the matrix with a step, scale 1; the rest of it is residual(step).
+  void add_slope_product(const ElementUnknowns<D>& step, const SlopePoint<D>& at, ElementUnknowns<D>& product) const;
 
  private:
   Eigen::Matrix<Real, D, D> strain_rate(const Eigen::Matrix<Real, D, D + 1>& velocity) const;

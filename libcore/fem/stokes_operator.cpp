@@ -25,7 +25,6 @@ void StokesOperator::prepare() {
     tuples_ = std::move(tuples);
     matrix_.reset();
     space_ = std::make_unique<NodeSpace>(*comm_, *mesh_, tuples_.nodes);
-    matrix_ = std::make_unique<SystemMatrix>(*comm_, *space_, tuples_);
     ++system_.pattern_version;
   }
   extended_constraints_ = constraints_.extended(space_->halo());

@@ -8,6 +8,7 @@
 #include "fem/facet.hpp"
 #include "fem/inertia_element.hpp"
 #include "fem/linear_system.hpp"
+#include "fem/matrix_free_tangent.hpp"
 #include "fem/residual_term.hpp"
 #include "fem/stokes_mini.hpp"
 #include "fem/system_matrix.hpp"
@@ -86,9 +87,11 @@ struct WorstNode {
 ///
 /// by condensed P1+/P1 elements. Holds the constraints, the loads, the viscosity of each element and the matrix. The
 /// communicator, the mesh, the model and the terms must outlive it; coordinates may move between calls.
-class StokesOperator {
+class StokesOperator : private MatrixEntries {
  public:
   StokesOperator(const Communicator& comm, const Mesh& mesh, Geometry geometry);
+  StokesOperator(const StokesOperator&) = delete;
+  StokesOperator& operator=(const StokesOperator&) = delete;
 
   const Mesh& mesh() const noexcept { return *mesh_; }
   Geometry geometry() const noexcept { return geometry_; }
@@ -107,6 +110,13 @@ class StokesOperator {
   /// flows there, and their pressure, which the subscales alone determine, would cost iterations and mean nothing
   /// (sections one element thin). Their other pressures can be filled in by extend_pressure(). Default: they stay.
   void leave_out_still_elements(bool leave_out) { leaves_out_still_ = leave_out; }
+
+  /// Whether tangents are kept by their products alone, where they can be: without terms, inertia and axis. Their
+  /// entries are then made for as long as a preconditioner takes to read them. Default: they are assembled.
+  void use_matrix_free(bool is_free) { wants_matrix_free_ = is_free; }
+  bool is_matrix_free() const noexcept {
+    return wants_matrix_free_ && terms_.empty() && !inertia_ && geometry_ == Geometry::plane;
+  }
 
   /// To be called when constraints, loads, gates, terms or coordinates were set or changed: volumes, couplings,
   /// halo of the constraints; finds whether anything fixes the mean pressure. Elements of zero viscosity are left
@@ -144,7 +154,7 @@ class StokesOperator {
   /// The residual at the current viscosities, scaled and projected as LinearSystem says (the right side of a step is
   /// its negative). Collective.
   ResidualReport residual(const StokesState& state, LinearVector& result);
-  /// The matrix at the current viscosities. Collective.
+  /// The matrix at the current viscosities, which must stay as they are while a matrix-free one is used. Collective.
   const LinearSystem& tangent(const StokesState& state, Tangent kind);
   /// Adds a factor times the step's velocities, and another times its pressures and borders, scales undone; copies
   /// updated. Collective.
@@ -206,6 +216,10 @@ class StokesOperator {
   template <class Element>
   void add_element_matrices(const StokesState& state, Tangent kind);
   void scale_borders();
+  void assemble_matrix(const StokesState& state, Tangent kind);
+  void make_matrix_free(const StokesState& state, Tangent kind);
+  Mat assemble() override;
+  void release() override;
 
   const Communicator* comm_;
   const Mesh* mesh_;
@@ -225,7 +239,11 @@ class StokesOperator {
 
   NodeTuples tuples_;
   std::unique_ptr<NodeSpace> space_;
-  std::unique_ptr<SystemMatrix> matrix_;
+  std::unique_ptr<SystemMatrix> matrix_;  ///< null where none is assembled
+  bool wants_matrix_free_ = false;
+  std::unique_ptr<MatrixFreeTangent> products_;
+  StokesState linearized_;  ///< where a matrix-free tangent is taken
+  Tangent linearized_kind_ = Tangent::picard;
   LinearSystem system_;
   Real length_ = 1;     ///< of a typical element, m
   Real stiffness_ = 1;  ///< eta h^(dim-2), of the size of A's entries

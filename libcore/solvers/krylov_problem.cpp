@@ -24,10 +24,10 @@ constexpr int baseline_iterations = 20;  ///< times those allowed to our own met
 /// A preconditioner of K alone for the methods that need no more: ILU(0) of each rank's rows, or MUMPS.
 class KernelPreconditioner {
  public:
-  KernelPreconditioner(const LinearSystem& system, LinearMethod method) {
+  KernelPreconditioner(const LinearSystem& system, LinearMethod method) : matrix_(system) {
     petsc_call(PCCreate(system.comm->raw(), pc_.out()));
     petsc_call(PCSetOptionsPrefix(pc_.get(), "kernel_"));
-    petsc_call(PCSetOperators(pc_.get(), system.matrix, system.matrix));
+    petsc_call(PCSetOperators(pc_.get(), matrix_.get(), matrix_.get()));
     if (method == LinearMethod::direct) {
       set_direct();
     } else {
@@ -50,6 +50,7 @@ class KernelPreconditioner {
     petsc_call(MatMumpsSetIcntl(factor, null_pivots, 1));
   }
 
+  AssembledMatrix matrix_;
   PetscPreconditioner pc_;
 };
 

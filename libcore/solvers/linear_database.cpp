@@ -61,6 +61,10 @@ void read_database(LinearSolverOptions& options) {
   read_choice("-malleus_method", methods, options.method);
   read_choice("-malleus_modes", modes, options.preconditioner.modes);
   read_choice("-malleus_precision", precisions, options.preconditioner.precision);
+  constexpr std::array matrices = {"assembled", "free"};
+  int matrix = options.matrix_free ? 1 : 0;
+  read_choice("-malleus_matrix", matrices, matrix);
+  options.matrix_free = matrix == 1;
   read_integer("-malleus_chebyshev_steps", 1, options.preconditioner.chebyshev_steps);
   read_integer("-malleus_restart", 0, options.restart);
   PetscReal threshold = options.preconditioner.threshold;

@@ -93,6 +93,7 @@ void Loop::start_viscosity() {
 bool Loop::compute_step(bool newton, Real tolerance) {
   const Stopwatch watch;
   const Tangent smooth = is_near() && !linear_.needs_symmetry() ? Tangent::newton : Tangent::symmetric;
+  op_.use_matrix_free(linear_.is_matrix_free());
   const LinearSystem& system = op_.tangent(state_, newton ? smooth : Tangent::picard);
   outcome_.assembly_seconds += watch.seconds();
   LinearVector right_side = residual_;

@@ -5,6 +5,7 @@
 
 #include "base/index.hpp"
 #include "solvers/petsc_objects.hpp"
+#include "solvers/viscosity_range.hpp"
 
 namespace malleus {
 namespace {
@@ -49,16 +50,16 @@ struct Parts {
   std::vector<GlobalId> copies;
 };
 
-Parts find_parts(const LinearSystem& system) {
+Parts find_parts(const LinearSystem& system, Mat matrix) {
   Parts parts;
   PetscBool is_sequential = PETSC_FALSE;
-  petsc_call(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(system.matrix), MATSEQBAIJ, &is_sequential));
+  petsc_call(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(matrix), MATSEQBAIJ, &is_sequential));
   if (is_sequential == PETSC_TRUE) {
-    parts.owned = system.matrix;
+    parts.owned = matrix;
     return parts;
   }
   const PetscInt* numbers = nullptr;
-  petsc_call(MatMPIBAIJGetSeqBAIJ(system.matrix, &parts.owned, &parts.foreign, &numbers));
+  petsc_call(MatMPIBAIJGetSeqBAIJ(matrix, &parts.owned, &parts.foreign, &numbers));
   PetscInt columns = 0;
   petsc_call(MatGetSize(parts.foreign, nullptr, &columns));
   parts.copies.assign(numbers, numbers + columns / system.block_size());
@@ -66,28 +67,30 @@ Parts find_parts(const LinearSystem& system) {
 }
 
 /// A power of two near 1 / (largest diagonal entry over all ranks).
-Real find_scaling(const LinearSystem& system) {
+Real find_scaling(Mat matrix) {
   PetscVector diagonal;
-  petsc_call(MatCreateVecs(system.matrix, nullptr, diagonal.out()));
-  petsc_call(MatGetDiagonal(system.matrix, diagonal.get()));
+  petsc_call(MatCreateVecs(matrix, nullptr, diagonal.out()));
+  petsc_call(MatGetDiagonal(matrix, diagonal.get()));
   PetscReal largest = 0;
   petsc_call(VecNorm(diagonal.get(), NORM_INFINITY, &largest));
   return largest > 0 ? std::exp2(-std::round(std::log2(largest))) : 1.0;
 }
 
 /// Splits the (dim+1)^2 blocks of one part into those of an entry.
+template <class T>
 class BlockWriter {
  public:
-  BlockWriter(StokesBlocks& blocks, int dim) : blocks_(blocks), dim_(dim) {}
+  BlockWriter(StokesBlocks& blocks, BlockValues<T>& velocity, int dim)
+      : blocks_(blocks), velocity_(velocity), dim_(dim) {}
 
   void add(LocalId column, const PetscScalar* block) {
     const auto entry = static_cast<LocalId>(blocks_.graph.columns.size());
     blocks_.graph.columns.push_back(column);
-    Real* velocity = blocks_.velocity.at(entry);
+    T* velocity = velocity_.at(entry);
     float* gradient = blocks_.gradient.at(entry);
     const int size = dim_ + 1;
     for (int c = 0; c < dim_; ++c) {
-      for (int r = 0; r < dim_; ++r) velocity[c * dim_ + r] = blocks_.scaling * block[c * size + r];
+      for (int r = 0; r < dim_; ++r) velocity[c * dim_ + r] = static_cast<T>(blocks_.scaling * block[c * size + r]);
     }
     for (int r = 0; r < dim_; ++r) gradient[r] = static_cast<float>(blocks_.scaling * block[dim_ * size + r]);
     blocks_.pressure[index(entry)] = static_cast<float>(-blocks_.scaling * block[dim_ * size + dim_]);
@@ -96,15 +99,16 @@ class BlockWriter {
 
  private:
   StokesBlocks& blocks_;
+  BlockValues<T>& velocity_;
   int dim_;
 };
 
-}  // namespace
-
-StokesBlocks extract_blocks(const LinearSystem& system) {
-  StokesBlocks blocks;
-  blocks.scaling = find_scaling(system);
-  Parts parts = find_parts(system);
+/// Fills all but the velocity's values, which are returned.
+template <class T>
+BlockValues<T> read_matrix(const LinearSystem& system, StokesBlocks& blocks) {
+  const AssembledMatrix matrix(system);
+  blocks.scaling = find_scaling(matrix.get());
+  Parts parts = find_parts(system, matrix.get());
   const int dim = system.mesh->dim;
   blocks.layout = BlockLayout(*system.comm, system.mesh->node_ownership, std::move(parts.copies));
   const SequentialPart owned(parts.owned);
@@ -112,11 +116,11 @@ StokesBlocks extract_blocks(const LinearSystem& system) {
       parts.foreign == nullptr ? nullptr : std::make_unique<SequentialPart>(parts.foreign);
   const PetscInt rows = owned.rows();
   const PetscInt entries = rows == 0 ? 0 : owned.end(rows - 1) + (foreign ? foreign->end(rows - 1) : 0);
-  blocks.velocity = BlockValues<Real>(dim, dim, entries);
+  BlockValues<T> velocity(dim, dim, entries);
   blocks.gradient = BlockValues<float>(dim, 1, entries);
   blocks.pressure.assign(index(entries), 0.0F);
   blocks.graph.columns.reserve(index(entries));
-  BlockWriter writer(blocks, dim);
+  BlockWriter<T> writer(blocks, velocity, dim);
   for (PetscInt row = 0; row < rows; ++row) {
     for (PetscInt k = owned.begin(row); k < owned.end(row); ++k) {
       writer.add(owned.column(k), owned.block(k, dim + 1));
@@ -127,6 +131,24 @@ StokesBlocks extract_blocks(const LinearSystem& system) {
     writer.close_row();
   }
   blocks.graph.find_diagonals();
+  return velocity;
+}
+
+}  // namespace
+
+StokesBlocks extract_blocks(const LinearSystem& system) {
+  // While entries are made for this alone, both copies of them are the peak of the memory. Single precision holds them
+  // where the cycle needs no more.
+  constexpr Real narrow_contrast = 1e6;
+  StokesBlocks blocks;
+  if (system.entries != nullptr && viscosity_range(system).contrast() <= narrow_contrast) {
+    const BlockValues<float> narrow = read_matrix<float>(system, blocks);
+    blocks.velocity.rows = narrow.rows;
+    blocks.velocity.columns = narrow.columns;
+    blocks.velocity.values.assign(narrow.values.begin(), narrow.values.end());
+  } else {
+    blocks.velocity = read_matrix<Real>(system, blocks);
+  }
   return blocks;
 }
 

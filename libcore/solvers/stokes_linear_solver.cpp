@@ -9,6 +9,7 @@
 #include "base/log.hpp"
 #include "solvers/krylov_problem.hpp"
 #include "solvers/linear_database.hpp"
+#include "solvers/viscosity_range.hpp"
 
 namespace malleus {
 namespace {
@@ -81,6 +82,11 @@ class StokesLinearSolver::Implementation {
     const auto start = Clock::now();
     const BorderedOperator op(system);
     KrylovProblem problem(op, right_side, solution);
+    if (!std::isfinite(problem.residual())) {
+      outcome.reason = "the right side or the matrix is not a number";
+      solution = {};
+      return outcome;
+    }
     const std::vector<Step> chain = make_chain(options_, system);
     first_step_ = std::min(first_step_, chain.size() - 1);
     for (std::size_t s = first_step_; s < chain.size() && !(problem.residual() <= tolerance); ++s) {
@@ -98,6 +104,8 @@ class StokesLinearSolver::Implementation {
   }
 
   bool needs_symmetry() const { return options_.method == LinearMethod::conjugate_residual; }
+
+  bool is_matrix_free() const { return options_.matrix_free; }
 
   void reset() {
     setup_.reset();
@@ -164,7 +172,8 @@ class StokesLinearSolver::Implementation {
       setup_->borders = op.borders();
       outcome.setup_built = true;
       outcome.setup_seconds += seconds_since(start);
-      log::debug("linear solver: {}", setup_->preconditioner->summary());
+      log::debug("linear solver: viscosity contrast {:.2g}: {}", viscosity_range(op.system()).contrast(),
+                 setup_->preconditioner->summary());
     }
     setup_->preconditioner->attach(op);
     return *setup_->preconditioner;
@@ -200,6 +209,10 @@ LinearOutcome StokesLinearSolver::solve(const LinearSystem& system, const Linear
 
 bool StokesLinearSolver::needs_symmetry() const {
   return implementation_->needs_symmetry();
+}
+
+bool StokesLinearSolver::is_matrix_free() const {
+  return implementation_->is_matrix_free();
 }
 
 void StokesLinearSolver::reset() {

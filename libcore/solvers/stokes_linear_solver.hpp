@@ -28,6 +28,7 @@ struct LinearSolverOptions {
   int restart = 0;                ///< Krylov vectors between restarts; 0 = 150 up to 200,000 nodes a rank, else 40
   int max_iterations = 300;       ///< of each step of the fallback chain; 20 times as many for the baselines
   bool reuse_setup = true;        ///< keep a hierarchy for later systems until the iterations grow
+  bool matrix_free = false;       ///< for memory: keep systems by their products alone, where they can be
   bool fall_back = true;          ///< try stronger settings where a solve fails
   LocalId direct_limit = 50'000;  ///< nodes over all ranks up to which the chain ends in MUMPS
 };
@@ -50,6 +51,7 @@ struct LinearOutcome {
 ///   -malleus_method block_triangular | gamg | gmres_ilu | conjugate_residual | direct
 ///   -malleus_modes automatic | translations | rigid
 ///   -malleus_precision automatic | single | double
+///   -malleus_matrix assembled | free
 ///   -malleus_threshold <strong couplings, 0.25>  -malleus_chebyshev_steps <3>  -malleus_restart <150 or 40>
 /// The choices made are said in the log's details, fallbacks as warnings.
 class StokesLinearSolver {
@@ -67,6 +69,9 @@ class StokesLinearSolver {
 
   /// Whether the method chosen asks for symmetric systems.
   bool needs_symmetry() const;
+
+  /// Whether systems shall be kept by their products alone (see StokesOperator::use_matrix_free).
+  bool is_matrix_free() const;
 
   /// Forgets the hierarchy, as after a remesh. The next solve builds a new one.
   void reset();

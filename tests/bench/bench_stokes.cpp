@@ -5,7 +5,8 @@
 ///   cells=33 (along each axis; 33, 50, 66, 96: 39k, 133k, 301k, 913k nodes)  dim=3  jitter=0.2  tolerance=1e-6
 ///   spheres=0 inside=1 (their viscosity; < 1 soft)  disjoint=0  aspect=1 (of flattened elements)
 ///   open=0 (1: free sides, pressed from above)  penalty=0 (of contacts on one of them, dimensionless)
-///   m=1 (rate sensitivity)  cut_off=0.01 (over speed / height)  forcing=0.05 (loosest linear tolerance)  json=0
+///   m=1 (rate sensitivity)  cut_off=0.01 (over speed / height)  forcing=0.05 (loosest linear tolerance)
+///   free=0 (1: the matrix by its products alone)  json=0
 /// Times are processor seconds, which a busy machine changes least.
 
 #include <fmt/format.h>
@@ -144,6 +145,7 @@ Figures measure(const Communicator& comm, const Values& values) {
   options.is_open = values.at("open") > 0;
   options.aspect = values.at("aspect");
   options.penalty = values.at("penalty");
+  options.matrix_free = values.at("free") > 0;
   Figures figures;
   const Real empty = status_bytes("VmRSS") + mesh_bytes(comm, options.box);
   test::StokesCavity cavity(comm, options);
@@ -186,9 +188,9 @@ int run_linear(const Communicator& comm, const Values& values) {
 
 int main(int argc, char** argv) {
   std::map<std::string, malleus::Real> values = {
-      {"cells", 33},   {"dim", 3},       {"jitter", 0.2}, {"tolerance", 1e-6}, {"spheres", 0}, {"inside", 1},
-      {"disjoint", 0}, {"open", 0},      {"m", 1},        {"cut_off", 0.01},   {"aspect", 1},  {"penalty", 0},
-      {"json", 0},     {"forcing", 0.05}};
+      {"cells", 33},   {"dim", 3},  {"jitter", 0.2},  {"tolerance", 1e-6}, {"spheres", 0}, {"inside", 1},
+      {"disjoint", 0}, {"open", 0}, {"m", 1},         {"cut_off", 0.01},   {"aspect", 1},  {"penalty", 0},
+      {"json", 0},     {"free", 0}, {"forcing", 0.05}};
   std::vector<std::string> petsc_options;
   bool is_for_petsc = false;
   for (int i = 1; i < argc; ++i) {

@@ -142,6 +142,7 @@ StokesCavity::StokesCavity(const Communicator& comm, const CavityOptions& option
   model_ = std::make_unique<GivenViscosity>(std::move(viscosity));
   equations_ = std::make_unique<StokesOperator>(comm, mesh_, Geometry::plane);
   equations_->set_viscosity(*model_);
+  equations_->use_matrix_free(options.matrix_free);
   if (options.penalty > 0) add_penalties(options.penalty, options.viscosity_scale);
   equations_->set_constraints(options.is_floating ? NodeConstraints(dim, mesh_.nodes())
                                                   : wall_constraints(mesh_, options.is_open));

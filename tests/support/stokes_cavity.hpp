@@ -27,6 +27,7 @@ struct CavityOptions {
   Real aspect = 1;       ///< the last coordinate is divided by this
   /// Dimensionless penalty r h / eta of contacts on the nodes of a patch of the side x = 1; with is_open.
   Real penalty = 0;
+  bool matrix_free = false;
 };
 
 /// `count` spheres of radius 0.05 to 0.13 in the unit box, always the same; apart from each other where `disjoint`, and

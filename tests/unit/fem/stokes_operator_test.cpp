@@ -219,6 +219,34 @@ TEST_P(StokesScene, TangentWithFrozenSubscalesIsSymmetric) {
   EXPECT_NEAR(forward, dot(y, multiply(system, x)), 1e-12 * (1 + std::abs(forward)));
 }
 
+TEST_P(StokesScene, ProductsWithoutTheMatrixAreThoseOfTheMatrix) {
+  Scene scene(world(), GetParam().first, GetParam().second);
+  scene.op.set_terms({});
+  scene.op.prepare();
+  const StokesState state = scene.some_state();
+  scene.op.update_viscosity(state);
+  const LinearVector x = some_direction(scene, 0.7);
+  for (const Tangent kind : {Tangent::picard, Tangent::symmetric, Tangent::newton}) {
+    scene.op.use_matrix_free(false);
+    const LinearVector expected = multiply(scene.op.tangent(state, kind), x);
+    scene.op.use_matrix_free(true);
+    const LinearSystem& system = scene.op.tangent(state, kind);
+    EXPECT_EQ(system.entries != nullptr, GetParam().second == Geometry::plane);
+    const LinearVector product = multiply(system, x);
+    Real largest = 0;
+    Real error = 0;
+    for (std::size_t i = 0; i < product.nodes.size(); ++i) {
+      largest = std::max(largest, std::abs(expected.nodes[i]));
+      error = std::max(error, std::abs(product.nodes[i] - expected.nodes[i]));
+    }
+    EXPECT_LT(error, 1e-12 * largest) << "tangent " << static_cast<int>(kind);
+    const AssembledMatrix matrix(system);
+    LinearSystem assembled = system;
+    assembled.matrix = matrix.get();
+    EXPECT_NEAR(dot(multiply(assembled, x), x), dot(expected, x), 1e-12 * std::abs(dot(expected, x)));
+  }
+}
+
 TEST_P(StokesScene, RankCountDoesNotChangeTheEquations) {
   const auto [dim, geometry] = GetParam();
   Scene scene(world(), dim, geometry);

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
+#include "base/floating_point.hpp"
 #include "solvers/bordered_operator.hpp"
 #include "support/stokes_cavity.hpp"
 #include "support/world.hpp"
@@ -155,6 +157,106 @@ TEST(StokesLinearSolver, FailureIsToldAndAnswered) {
   EXPECT_TRUE(saved.converged);
   EXPECT_EQ(saved.fallbacks, 4) << "rigid modes, double precision, GAMG, direct";
   EXPECT_LE(true_residual(scene.system(), scene.right_side(), solution), 1.000001e-6);
+}
+
+/// Translations are given fewer iterations than they need, and what rotations need.
+TEST(StokesLinearSolver, KeepsToTheStepThatSolvedTheLastSystem) {
+  CavityOptions options = cavity(3, 8);
+  options.spheres = test::spread_spheres(4, false);
+  options.inside = 1e4;
+  const StokesCavity scene(world(), options);
+  LinearSolverOptions weak;
+  weak.preconditioner.modes = CoarseModes::translations;
+  LinearVector solution;
+  weak.max_iterations = 400;
+  weak.fall_back = false;
+  const int with_translations = solve(scene, weak, 1e-6, solution).iterations;
+  weak.preconditioner.modes = CoarseModes::rigid;
+  const int with_rotations = solve(scene, weak, 1e-6, solution).iterations;
+  ASSERT_LT(with_rotations + 2, with_translations) << "else this scene shows nothing";
+  weak.preconditioner.modes = CoarseModes::translations;
+  weak.fall_back = true;
+  weak.max_iterations = with_rotations + 2;
+  StokesLinearSolver solver(weak);
+  solution = {};
+  const LinearOutcome first = solver.solve(scene.system(), scene.right_side(), 1e-6, solution);
+  EXPECT_TRUE(first.converged);
+  EXPECT_EQ(first.fallbacks, 1) << "rigid-body modes";
+  EXPECT_GT(first.iterations, weak.max_iterations) << "those of both steps count";
+  solution = {};
+  const LinearOutcome second = solver.solve(scene.system(), scene.right_side(), 1e-6, solution);
+  EXPECT_TRUE(second.converged);
+  EXPECT_EQ(second.fallbacks, 0);
+  EXPECT_FALSE(second.setup_built);
+}
+
+/// What is not a number never comes back as a solution, and ends the chain.
+TEST(StokesLinearSolver, NotANumberIsTold) {
+  const StokesCavity scene(world(), cavity(2, 6));
+  const TrapsOff traps_off;
+  LinearVector poisoned = scene.right_side();
+  for (Real& value : poisoned.nodes) value = std::numeric_limits<Real>::quiet_NaN();
+  LinearVector solution;
+  ASSERT_TRUE(solve(scene, {}, 1e-6, solution).converged);
+  const LinearOutcome outcome = StokesLinearSolver().solve(scene.system(), poisoned, 1e-6, solution);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_EQ(outcome.iterations, 0);
+  EXPECT_FALSE(outcome.reason.empty());
+  EXPECT_TRUE(solution.nodes.empty());
+}
+
+/// Entries of the matrix that are no numbers break every step of the chain down.
+TEST(StokesLinearSolver, BreakdownIsTold) {
+  const StokesCavity scene(world(), cavity(2, 6));
+  const TrapsOff traps_off;
+  MatScale(scene.system().matrix, std::numeric_limits<Real>::quiet_NaN());
+  LinearVector solution;
+  const LinearOutcome outcome = solve(scene, {}, 1e-6, solution);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_FALSE(outcome.reason.empty());
+  for (const Real value : solution.nodes) EXPECT_TRUE(std::isfinite(value));
+}
+
+/// 1e-18 is beyond what double precision holds: each step stagnates, and what is told is the residual that was reached.
+TEST(StokesLinearSolver, StagnationIsTold) {
+  const StokesCavity scene(world(), cavity(2, 10));
+  LinearVector solution;
+  const LinearOutcome outcome = solve(scene, {}, 1e-18, solution);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_FALSE(outcome.reason.empty());
+  EXPECT_LT(outcome.residual, 1e-9);
+  EXPECT_NEAR(outcome.residual, true_residual(scene.system(), scene.right_side(), solution), 1e-15);
+}
+
+/// A block a million times as stiff, deformable, pressed on a softer one: as a die on a workpiece.
+TEST(StokesLinearSolver, NearlyRigidBodiesCostLittle) {
+  CavityOptions options = cavity(3, 12);
+  options.is_open = true;
+  const int plain = iterations(world(), options);
+  options.spheres = {{{0.5, 0.5, 1.3}, 0.7}};  // the upper part, with the top that moves
+  options.inside = 4.6e6;
+  EXPECT_LE(iterations(world(), options), 1.6 * plain);
+}
+
+TEST(StokesLinearSolver, MatrixFreeSystemsAreSolvedAlike) {
+  CavityOptions options = cavity(3, 8);
+  options.spheres = test::spread_spheres(4, false);
+  options.inside = 1e3;
+  const StokesCavity assembled(world(), options);
+  options.matrix_free = true;
+  const StokesCavity scene(world(), options);
+  ASSERT_NE(scene.system().entries, nullptr);
+  LinearVector expected;
+  LinearVector solution;
+  const LinearOutcome reference = solve(assembled, {}, 1e-8, expected);
+  for (const LinearMethod method : {LinearMethod::block_triangular, LinearMethod::gamg, LinearMethod::direct}) {
+    const LinearOutcome outcome = solve(scene, {.method = method, .fall_back = false}, 1e-8, solution);
+    EXPECT_TRUE(outcome.converged) << outcome.reason;
+    EXPECT_LT(relative_difference(solution, expected), 1e-5);
+    if (method == LinearMethod::block_triangular) {
+      EXPECT_NEAR(outcome.iterations, reference.iterations, 1);
+    }
+  }
 }
 
 TEST(StokesLinearSolver, SameInputGivesTheSameBits) {
