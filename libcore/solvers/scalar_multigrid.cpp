@@ -21,6 +21,15 @@ void multiply(const ScalarMatrix& matrix, std::vector<Real>& x, std::vector<Real
   }
 }
 
+/// Coupled with no other node, as those of elements that are not modelled: a sweep solves its row. On coarse levels
+/// such nodes would be aggregates of one, too many of them to go on.
+bool is_alone(const ScalarMatrix& matrix, LocalId row) {
+  for (LocalId k = matrix.graph.offsets[index(row)]; k < matrix.graph.offsets[index(row) + 1]; ++k) {
+    if (matrix.graph.columns[index(k)] != row && matrix.values[index(k)] != 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::vector<Real> solve_conjugate_gradients(const ScalarMatrix& matrix, const std::vector<Real>& b,
@@ -73,7 +82,7 @@ std::unique_ptr<VelocityMultigrid> make_scalar_multigrid(const ScalarMatrix& mat
   finest.points.assign(index(matrix.graph.rows()), 0.0);
   finest.left_out.resize(index(matrix.graph.rows()));
   for (LocalId row = 0; row < matrix.graph.rows(); ++row) {
-    finest.left_out[index(row)] = !(matrix.diagonal(row) > 0);
+    finest.left_out[index(row)] = !(matrix.diagonal(row) > 0) || is_alone(matrix, row);
   }
   MultigridSettings settings;
   settings.coarsest_unknowns = 200;

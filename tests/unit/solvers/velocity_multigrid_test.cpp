@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "solvers/multigrid/galerkin.hpp"
+#include "solvers/scalar_multigrid.hpp"
 #include "solvers/stokes_blocks.hpp"
 #include "support/stokes_cavity.hpp"
 #include "support/world.hpp"
@@ -134,6 +135,41 @@ TEST(VelocityMultigrid, RigidMotionsHaveNoEnergyOnCoarseLevels) {
     }
     const Real nodes = static_cast<Real>(coarse.layout.ownership.total());
     EXPECT_LT(std::abs(world().sum(energy)) / (world().max(largest) * nodes), 1e-13);
+  }
+}
+
+/// Nodes that nothing couples to others, as those of elements that are not modelled, stay off the coarse levels.
+TEST(ScalarMultigrid, NodesThatAreAloneDoNotStopTheCoarsening) {
+  const test::StokesCavity scene(world(), scene_options(2));
+  const StokesBlocks blocks = extract_blocks(scene.system());
+  std::vector<float> places(static_cast<std::size_t>(blocks.layout.size()));
+  for (LocalId row = 0; row < blocks.graph.rows(); ++row) {
+    places[static_cast<std::size_t>(row)] = static_cast<float>(scene.mesh().point(row)[0]);
+  }
+  blocks.layout.halo.update_copies(std::span(places), 1);
+  const auto is_alone = [&](LocalId local) { return places[static_cast<std::size_t>(local)] > 0.3F; };
+  std::vector<Real> values(static_cast<std::size_t>(blocks.graph.entries()), 0.0);
+  for (LocalId row = 0; row < blocks.graph.rows(); ++row) {
+    const auto r = static_cast<std::size_t>(row);
+    const auto diagonal = static_cast<std::size_t>(blocks.graph.diagonals[r]);
+    values[diagonal] = 1;
+    for (LocalId k = blocks.graph.offsets[r]; k < blocks.graph.offsets[r + 1]; ++k) {
+      const LocalId column = blocks.graph.columns[static_cast<std::size_t>(k)];
+      if (column == row || is_alone(row) || is_alone(column)) continue;
+      values[static_cast<std::size_t>(k)] = -1;
+      values[diagonal] += 1;
+    }
+  }
+  const ScalarMatrix matrix{world(), blocks.layout, blocks.graph, values};
+  const auto multigrid = make_scalar_multigrid(matrix);
+  ASSERT_GE(multigrid->levels().size(), 2U);
+  EXPECT_LT(3 * multigrid->levels()[1].nodes, multigrid->levels()[0].nodes);
+  std::vector<Real> one(static_cast<std::size_t>(blocks.graph.rows()), 1.0);
+  std::vector<Real> corrected = one;
+  multigrid->apply(one.data(), corrected.data());
+  for (LocalId row = 0; row < blocks.graph.rows(); ++row) {
+    if (!is_alone(row)) continue;
+    EXPECT_NEAR(corrected[static_cast<std::size_t>(row)], 1, 1e-6);
   }
 }
 
