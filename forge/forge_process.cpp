@@ -148,22 +148,6 @@ std::vector<LeftOut> ForgeProcess::left_out() const {
 
 /// Dies so much stiffer than what they press that their own deformation changes the forces by less than a tenth of a
 /// per cent (cases/press: 100 times as stiff, 4e-5).
-std::vector<std::string> ForgeProcess::suggestions() const {
-  constexpr Real as_good_as_rigid = 50;
-  Real softest = std::numeric_limits<Real>::infinity();
-  for (const Body& body : scene_->bodies) {
-    if (body.is_deformable()) softest = std::min(softest, body.consistency);
-  }
-  std::vector<std::string> lines;
-  for (const Body& body : scene_->bodies) {
-    if (!body.is_deformable() || body.consistency < as_good_as_rigid * softest) continue;
-    lines.push_back(
-        fmt::format("deformation of {}: it is {:.3g} times as stiff as the softest body; [body.{}] law = rigid",
-                    body.name, body.consistency / softest, body.name));
-  }
-  return lines;
-}
-
 std::vector<std::string> ForgeProcess::accuracy_settings() const {
   return {fmt::format("newton_tolerance {:g}, linear_tolerance {:g}, cutoff_strain_rate {:g} of {:.3g} 1/s",
                       scene_->solver.newton_tolerance, scene_->solver.linear_tolerance,

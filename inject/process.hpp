@@ -35,6 +35,7 @@ class FillingProcess final : public Process {
   FieldStore& fields() override { return scene_.fields; }
   std::vector<Component*> components() override { return order_; }
   std::vector<LeftOut> left_out() const override;
+  std::vector<std::string> suggestions() const override;
   std::vector<std::string> accuracy_settings() const override;
   Forecast forecast() const override;
   std::vector<std::string> output_fields() const override;

@@ -71,6 +71,14 @@ class Forge(What):
         self.assertEqual(found - self.fields, {"temperature"})
         self.assertEqual(len(components - self.components), 1)
 
+    def rows(self, name, *options):
+        """Rows of the matrices that a run hands to PETSc, each size once."""
+        finished = run("forge", self.directory / "case.ini", self.directory / name, "--", "-mat_view", "::ascii_info")
+        return set(map(int, re.findall(r"rows=(\d+)", finished.stdout)))
+
+    def test_the_matrix_has_a_row_for_each_component_of_the_flow_alone(self):
+        self.assertEqual(self.rows("rows"), {3 * summary(self.directory / "plain")["nodes"]})
+
     def test_points_are_recorded_where_they_are_asked_for(self):
         self.assertFalse([name for name in files(self.directory / "plain") if name.startswith("probe")])
         self.forged("[probe.middle]\npoint = 0.5 0.5\n", "probes")
@@ -80,6 +88,14 @@ class Forge(What):
         self.assertNotIn("estimate", self.components)
         self.forge(case_text(0.5, 2, 1, "boundaries"), name="estimate")
         self.assertIn("estimate", set(summary(self.directory / "estimate")["components"]))
+
+    def test_a_check_names_weight_that_is_nothing_beside_the_flow_stress(self):
+        for acceleration, is_named in (("0 -9.81", True), ("0 -9.81e12", False)):
+            text = case_text(0.5, 2, 1, "boundaries", extra=ALONE + f"[gravity]\nacceleration = {acceleration}\n")
+            text = text.replace("rate_sensitivity = 0.5", "rate_sensitivity = 0.5\ndensity = 7800")
+            (self.directory / "case.ini").write_text(text)
+            plan = run("forge", self.directory / "case.ini", self.directory / "weight", "--check").stdout
+            self.assertEqual("no [gravity]" in plan, is_named, plan)
 
 
 class Inject(What):
@@ -110,6 +126,14 @@ class Inject(What):
         self.assertEqual(components, {"flow", "front", "filling"})
         self.assertIn("level_set", found)
         self.assertNotIn("temperature", found)
+
+    def test_a_check_names_inertia_at_small_reynolds_numbers(self):
+        for viscosity, is_named in ((100, True), (1, False)):
+            melt = f"[fluid.melt]\nlaw = newtonian\nviscosity = {viscosity}\ndensity = 1\n"
+            text = "[mesh]\nfile = box.msh\n[time]\nend = 1\nstep = 0.1\n[inertia]\n[initial]\nfluid = melt\n" + melt + self.ENDS
+            (self.directory / "case.ini").write_text(text)
+            plan = run("inject", self.directory / "case.ini", self.directory / "plan", "--check").stdout
+            self.assertEqual("no [inertia]" in plan, is_named, plan)
 
     def test_a_prescribed_flow_solves_no_equations(self):
         air = "[fluid.air]\nlaw = newtonian\nviscosity = 1e-3\n[initial]\nfluid = air\n"
