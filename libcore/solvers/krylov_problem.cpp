@@ -107,6 +107,10 @@ KrylovProblem::KrylovProblem(const BorderedOperator& op, const LinearVector& rig
     : operator_(op), b_(op.make_vector()), x_(op.make_vector()), work_(op.make_vector()) {
   op.fill(right_side, b_.get());
   petsc_call(VecNorm(b_.get(), NORM_2, &size_));
+  if (!std::isfinite(size_)) {
+    residual_ = size_;
+    return;
+  }
   remove_null_space(b_.get());
   if (guess.nodes.size() == op.node_unknowns() && guess.borders.size() == op.system().borders.size()) {
     op.fill(guess, x_.get());

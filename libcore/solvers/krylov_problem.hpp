@@ -15,7 +15,8 @@ class KrylovProblem {
   /// guess: [owned node][dim+1] and borders, or empty for zero. The operator must outlive the problem. Collective.
   KrylovProblem(const BorderedOperator& op, const LinearVector& right_side, const LinearVector& guess);
 
-  Real residual() const { return residual_; }  ///< ||b - K x|| / ||b|| by its definition; 0 where b = 0
+  /// ||b - K x|| / ||b|| by its definition; 0 where b = 0, not finite where b or K is not.
+  Real residual() const { return residual_; }
   Vec solution() const { return x_.get(); }
 
   /// Our preconditioner, made or kept, when the method (or the user's -pc_type) asks for it. Collective.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -82,7 +83,7 @@ class StokesLinearSolver::Implementation {
     const auto start = Clock::now();
     const BorderedOperator op(system);
     KrylovProblem problem(op, right_side, solution);
-    if (!std::isfinite(problem.residual())) {
+    if (!std::isfinite(problem.residual()) || !std::isfinite(tolerance)) {
       outcome.reason = "the right side or the matrix is not a number";
       solution = {};
       return outcome;
