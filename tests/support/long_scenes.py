@@ -89,7 +89,7 @@ def inertia(directory):
 
 def filling(directory, cells=4):
     channel_mesh(directory / "scene.msh", cells)
-    return CHANNEL.replace("[mesh]\nfile = channel.msh\n", "") + "[time]\nincrements = {increments}\nend = 1\n"
+    return CHANNEL.replace("[mesh]\nfile = channel.msh\n", "") + "[time]\nincrements = {increments}\nstep = 0.02\nend = 1\n"
 
 
 def trace(directory):
@@ -101,7 +101,7 @@ def trace(directory):
 def gas(directory):
     """Void that is compressed in a closed channel, by a gate that switches over."""
     text = filling(directory).replace("[vent.outlet]", "[wall.outlet]\ncondition = slip")
-    text = text.replace("fluid = polymer\n", "fluid = polymer\nswitch_fill = 0.45\nthen_pressure = 1 MPa\n", 1)
+    text = text.replace("fluid = polymer\n", "fluid = polymer\nswitch_fill = 0.3\nthen_pressure = 1 MPa\n", 1)
     return text + ("[fluid.air]\nlaw = void\n[initial]\nfluid = air\n[initial.start]\nfluid = polymer\nlevel_set = \"0.004 - x\"\n"
                    "[air]\ntrapped = gas\n")
 

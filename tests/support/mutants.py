@@ -8,6 +8,7 @@ import tempfile
 import threading
 
 from runs import BIN, LAUNCH
+from small_meshes import SmallMesh
 
 MOST_WORK = 10  # processor seconds of all ranks that an answer may take
 PATIENCE = 300  # seconds after which it is no answer, also where others keep the machine busy
@@ -131,6 +132,21 @@ fields = velocity level_set
 wall_time = 2 h
 """,
 }
+
+
+def square(cells):
+    """The unit square of wrong_input_test.MESH in cells x cells squares: fine enough for --check to run the scene ahead."""
+    number = lambda i, j: 1 + i + j * (cells + 1)
+    nodes = [(i / cells, j / cells) for j in range(cells + 1) for i in range(cells + 1)]
+    elements = []
+    for i in range(cells):
+        elements += [(1, 1, (number(i, 0), number(i + 1, 0))), (1, 2, (number(cells, i), number(cells, i + 1))),
+                     (1, 3, (number(i + 1, cells), number(i, cells))), (1, 4, (number(0, i + 1), number(0, i)))]
+        for j in range(cells):
+            elements += [(2, 5, (number(i, j), number(i + 1, j), number(i + 1, j + 1))),
+                         (2, 5, (number(i, j), number(i + 1, j + 1), number(i, j + 1)))]
+    names = {(1, 1): "bottom", (1, 2): "right", (1, 3): "top", (1, 4): "left", (2, 5): "part"}
+    return SmallMesh({k: (x, y, 0.0) for k, (x, y) in enumerate(nodes, 1)}, elements, names).msh()
 
 
 def damage(text, dice):

@@ -17,6 +17,16 @@ class Mutants(unittest.TestCase):
                         self.assertIsNone(checker.judge(program, text, is_wrong, answers, ranks))
                     self.assertGreater(answers.codes[2], count // 4)
 
+    def test_scenes_that_overflow_are_answered(self):
+        """--check runs them ahead on a mesh of some cells; what is not finite there is no defect."""
+        for program, key, huge in (("inject", "acceleration = 0 -9.81", "acceleration = 1e300 -9.81"),
+                                   ("forge", "consistency = 10 Pa.s^m", "consistency = 1e300 Pa.s^m")):
+            with self.subTest(program), tempfile.TemporaryDirectory() as directory:
+                answers = mutants.Answers()
+                text = mutants.CASES[program].replace(key, huge)
+                self.assertIn(huge, text)
+                self.assertIsNone(mutants.Checker(directory, mutants.square(8)).judge(program, text, False, answers))
+
     def test_what_is_not_mutated_is_accepted(self):
         """Else nothing would be learnt from mutants that are refused."""
         for program in ("forge", "inject"):
