@@ -7,6 +7,7 @@ of true and of estimated errors are compared.
 """
 import dataclasses
 import math
+import subprocess
 from collections.abc import Callable
 
 import numpy as np
@@ -33,6 +34,16 @@ class Scene:
     meshes: list     # options of the case's mesh script, for each mesh
     error: Callable  # of a results.Run: the true error, relative
     settings: tuple = ()
+
+
+def mesh_of(case, options, folder):
+    """The mesh of a case by these options of its mesh script, made once."""
+    name = case.split("/")[0]
+    path = folder / f"{name}-{'-'.join(options).replace('--', '')}.msh"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        subprocess.run([CASES / name / "mesh", *options, "-o", path], check=True, stdout=subprocess.DEVNULL)
+    return path
 
 
 def table(case):

@@ -29,7 +29,7 @@ Real size_ratio(const Mesh& fine, const Mesh& coarse) {
 /// What part of a run on its own mesh told, over what was extrapolated from coarser ones.
 Rehearsal with_own_part(const Rehearsal& own, const Rehearsal& extrapolated) {
   constexpr Real enough_increments = 4;
-  constexpr Real enough_progress = 0.3;
+  constexpr Real enough_progress = 0.7;  // increments are not spread evenly: coarser meshes tell better how many follow
   Rehearsal run = extrapolated;
   run.first_s = own.first_s;
   run.other_error = own.other_error;
