@@ -307,12 +307,14 @@ class Odd(LongRuns):
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, self.directory / "clock.c"], check=True)
         case = write_case("forge", self.directory, self.INCREMENTS)
         whole = self.run_to_end("forge", case, "whole")
-        jumping = self.run_to_end("forge", case, "jumping", env={**os.environ, "LD_PRELOAD": str(library)})
+        preloaded = ":".join(filter(None, [str(library), os.environ.get("LD_PRELOAD")]))
+        jumping = self.run_to_end("forge", case, "jumping", env={**os.environ, "LD_PRELOAD": preloaded})
         self.assert_same_digits(jumping, whole)
         walls = [float(line.split(",")[8]) for line in (jumping / "history.csv").read_text().splitlines()[1:]]
         self.assertEqual(walls, sorted(walls))
         self.assertLess(walls[-1], 3600)
 
+    @unittest.skipIf(PATIENCE > 1, "a build with sanitizers, which end a program without memory in their own way")
     def test_out_of_memory(self):
         case = write_case("forge", self.directory, self.INCREMENTS)
         output = self.directory / "out"
