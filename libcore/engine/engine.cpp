@@ -134,13 +134,14 @@ void Engine::print_outlook() {
                      outputs * (output_s * comm_.size() + output_s_per_node * nodes) +
                      (plan.is_steady() ? 0 : checkpoint_s) * comm_.size();
   log::info(
-      "rehearsed on coarser meshes: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
+      "rehearsed: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
       "MiB",
       outlook->increments, outlook->increment_s, total, report::duration(total / comm_.size()), comm_.size(),
       comm_.size() == 1 ? "" : "s",
       (memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0)) / 1048576);
-  log::info("expected error {:.2g} %: of space {:.2g} %, of other sources {:.2g} %",
-            100 * std::hypot(outlook->error, outlook->other_error), 100 * outlook->error, 100 * outlook->other_error);
+  const std::string of_space = outlook->error > 0 ? fmt::format("{:.2g} %", 100 * outlook->error) : "unknown";
+  log::info("expected error {:.2g} %: of space {}, of other sources {:.2g} %",
+            100 * std::hypot(outlook->error, outlook->other_error), of_space, 100 * outlook->other_error);
 }
 
 void Engine::open_outputs() {

@@ -38,6 +38,16 @@ Rehearsal with_own_part(const Rehearsal& own, const Rehearsal& extrapolated) {
   return run;
 }
 
+Outlook outlook_on(const Rehearsal& run, bool is_steady) {
+  Outlook outlook;
+  outlook.increment_s = is_steady ? run.first_s : run.later_s;
+  outlook.increments = run.increments;
+  outlook.first_s = run.first_s;
+  outlook.other_error = run.other_error;
+  outlook.solves = run.solves;
+  return outlook;
+}
+
 FieldStore copy_of(const Mesh& mesh, const FieldStore& fields) {
   FieldStore copy;
   for (const Field* field : fields.all()) {
@@ -158,6 +168,10 @@ std::optional<Outlook> SpaceEstimate::look_ahead(Process& process, const RunPlan
     seen.push_back(std::move(*rehearsal));
   }
   twins_.clear();
+  if (seen.empty() && factory_ && most_s > 0) {  // no coarser mesh holds the scene: its own tells time, but nothing of its error
+    const auto own = rehearse(comm_, process, plan, most_s);
+    if (own) return outlook_on(*own, plan.is_steady());
+  }
   if (seen.empty()) return std::nullopt;
   const Mesh& mesh = process.mesh();
   const auto nodes = static_cast<Real>(mesh.total_nodes());
@@ -169,11 +183,10 @@ std::optional<Outlook> SpaceEstimate::look_ahead(Process& process, const RunPlan
       comparison = {{1}, {own->results}};
     }
   }
-  outlook.increment_s = plan.is_steady() ? run.first_s : run.later_s;
-  outlook.increments = run.increments;
-  outlook.first_s = run.first_s;
-  outlook.other_error = run.other_error;
-  outlook.solves = run.solves;
+  const Outlook costs = outlook;
+  outlook = outlook_on(run, plan.is_steady());
+  outlook.making_s = costs.making_s;
+  outlook.coarse_s = costs.coarse_s;
   const Real base = comparison.sizes.empty() ? seen[0].nodes : nodes;  // the finest of which results are known
   for (const Rehearsal& one : seen) {
     comparison.sizes.push_back(std::pow(base / one.nodes, 1.0 / mesh.dim));

@@ -36,7 +36,7 @@ struct Outlook {
 /// Repeats increments of a process on coarser meshes. Collective throughout.
 class SpaceEstimate {
  public:
-  /// without factory: never estimates.
+  /// without factory: never estimates, and looks ahead not at all.
   SpaceEstimate(const Communicator& comm, ProcessFactory factory) : comm_(comm), factory_(std::move(factory)) {}
 
   bool is_asked_for() const { return static_cast<bool>(factory_); }
