@@ -9,6 +9,8 @@
 #include "base/error.hpp"
 #include "forge/contact_couplings.hpp"
 #include "forge/forge_budget.hpp"
+#include "forge/push_out.hpp"
+#include "forge/state_json.hpp"
 #include "mesh/simplex.hpp"
 
 namespace malleus::forge {
@@ -17,49 +19,6 @@ namespace {
 /// A run that a stroke ends is over after so many increments in which the stroke did not advance.
 constexpr int most_at_rest = 200;
 constexpr Real no_limit = std::numeric_limits<Real>::infinity();
-
-nlohmann::json press_json(const PressState& state) {
-  return {{"stroke", state.stroke},
-          {"speed", state.speed},
-          {"last_speed", state.last_speed},
-          {"last_force", state.last_force},
-          {"allowed_speed", state.allowed_speed},
-          {"stopped", state.stopped}};
-}
-
-PressState press_state(const nlohmann::json& json) {
-  PressState state;
-  state.stroke = json.at("stroke");
-  state.speed = json.at("speed");
-  state.last_speed = json.at("last_speed");
-  state.last_force = json.at("last_force");
-  state.allowed_speed = json.at("allowed_speed");
-  state.stopped = json.at("stopped");
-  return state;
-}
-
-nlohmann::json heat_json(const HeatTotals& totals) {
-  return {{"stored_J", totals.stored},
-          {"dissipated_J", totals.dissipated},
-          {"friction_J", totals.friction},
-          {"imposed_J", totals.imposed},
-          {"lost_J", totals.lost}};
-}
-
-HeatTotals heat_totals(const nlohmann::json& json) {
-  return {json.at("stored_J"), json.at("dissipated_J"), json.at("friction_J"), json.at("imposed_J"), json.at("lost_J")};
-}
-
-nlohmann::json work_json(const WorkBalance& work) {
-  return {{"imposed_J", work.imposed},
-          {"tools_J", work.tools},
-          {"deformation_J", work.deformation},
-          {"contact_J", work.contact}};
-}
-
-WorkBalance work_of(const nlohmann::json& json) {
-  return {json.at("imposed_J"), json.at("tools_J"), json.at("deformation_J"), json.at("contact_J")};
-}
 
 /// Whether an output or a probe shows the field.
 bool is_recorded(const CommonSections& common, const std::string& field) {
@@ -126,6 +85,7 @@ RemeshedScene ForgeProcess::remeshed_scene() {
 /// A remesh moves free surfaces within their curvature and ends the history of the time scheme.
 void ForgeProcess::mesh_changed() {
   scene_->boundaries->mesh_changed();
+  push_out_of_tools(*scene_);
   flow_.remeshed();
   scene_->progress.last_step = 0;
   const std::vector<Real> volumes = body_volumes(*scene_);

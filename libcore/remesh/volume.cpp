@@ -29,24 +29,59 @@ std::vector<FreeFace<D>> free_faces(const WorkingMesh<D, Metric>& mesh) {
   return faces;
 }
 
+template <int D, class Metric>
+Point<D> inward_normal(const WorkingMesh<D, Metric>& mesh, const FreeFace<D>& face) {
+  const Point<D>& origin = mesh.point(face.node[0]);
+  const Point<D> e = difference<D>(mesh.point(face.node[1]), origin);
+  if constexpr (D == 2) {
+    return {-e[1], e[0]};
+  } else {
+    return cross(e, difference<D>(mesh.point(face.node[2]), origin));
+  }
+}
+
+/// [vertex] those of faces with a vertex about which the surface is flat: resampling lost nothing there, and what is
+/// flat within a curved patch is pressed flat by something (a tool), which a shift would run into. None where that
+/// leaves nothing else.
+template <int D, class Metric>
+std::vector<char> flat_parts(const WorkingMesh<D, Metric>& mesh, const std::vector<FreeFace<D>>& faces) {
+  constexpr Real parallel = 1 - 5e-7;  // cosine of a thousandth
+  std::vector<Point<D>> first(mesh.points.size(), Point<D>{});
+  std::vector<char> is_flat(mesh.points.size(), 0);
+  for (const auto& face : faces) {
+    for (const LocalId v : face.node) is_flat[static_cast<std::size_t>(v)] = 1;
+  }
+  for (const auto& face : faces) {
+    const Point<D> normal = normalized(inward_normal<D, Metric>(mesh, face));
+    for (const LocalId v : face.node) {
+      Point<D>& known = first[static_cast<std::size_t>(v)];
+      if (!(dot(known, known) > 0)) known = normal;
+      if (dot(known, normal) < parallel) is_flat[static_cast<std::size_t>(v)] = 0;
+    }
+  }
+  std::vector<char> held(mesh.points.size(), 0);
+  bool all = true;
+  for (const auto& face : faces) {
+    const auto flat = [&](LocalId v) { return is_flat[static_cast<std::size_t>(v)] != 0; };
+    const bool any = std::any_of(face.node.begin(), face.node.end(), flat);
+    for (const LocalId v : face.node) held[static_cast<std::size_t>(v)] |= static_cast<char>(any);
+    all = all && any;
+  }
+  if (all) std::fill(held.begin(), held.end(), 0);
+  return held;
+}
+
 /// Derivative of a region's volume with respect to each vertex: minus the inward normals of its faces over D!.
 template <int D, class Metric>
-void volume_gradients(const WorkingMesh<D, Metric>& mesh, const std::vector<FreeFace<D>>& faces, std::int16_t region,
-                      std::vector<Point<D>>& gradients) {
+void volume_gradients(const WorkingMesh<D, Metric>& mesh, const std::vector<FreeFace<D>>& faces,
+                      const std::vector<char>& held, std::int16_t region, std::vector<Point<D>>& gradients) {
   std::fill(gradients.begin(), gradients.end(), Point<D>{});
   for (const auto& face : faces) {
     if (face.region != region) continue;
-    Point<D> inward;
-    const Point<D>& origin = mesh.point(face.node[0]);
-    if constexpr (D == 2) {
-      const Point<D> e = difference<D>(mesh.point(face.node[1]), origin);
-      inward = {-e[1], e[0]};
-    } else {
-      inward = cross(difference<D>(mesh.point(face.node[1]), origin), difference<D>(mesh.point(face.node[2]), origin));
-    }
+    const Point<D> inward = inward_normal<D, Metric>(mesh, face);
     for (const LocalId v : face.node) {
       const Vertex& vertex = mesh.vertex(v);
-      if (vertex.dimension != D - 1 || vertex.fixed) continue;
+      if (vertex.dimension != D - 1 || vertex.fixed || held[static_cast<std::size_t>(v)] != 0) continue;
       auto& gradient = gradients[static_cast<std::size_t>(v)];
       gradient = shifted<D>(gradient, inward, -1 / factorial<D>);
     }
@@ -83,6 +118,7 @@ template <int D, class Metric>
 Real restore_volumes(WorkingMesh<D, Metric>& mesh, const std::vector<Real>& targets) {
   constexpr int most_steps = 6;
   const std::vector<FreeFace<D>> faces = free_faces(mesh);
+  const std::vector<char> held = flat_parts<D, Metric>(mesh, faces);
   std::vector<Point<D>> gradients(mesh.points.size());
   const std::vector<Point<D>> before = mesh.points;
   const auto error_of = [&](std::size_t region, Real volume) {
@@ -93,7 +129,7 @@ Real restore_volumes(WorkingMesh<D, Metric>& mesh, const std::vector<Real>& targ
     bool moved = false;
     for (std::size_t r = 0; r < targets.size(); ++r) {
       if (error_of(r, volumes[r]) < 1e-15) continue;
-      volume_gradients<D, Metric>(mesh, faces, static_cast<std::int16_t>(r), gradients);
+      volume_gradients<D, Metric>(mesh, faces, held, static_cast<std::int16_t>(r), gradients);
       moved = shift_surface<D, Metric>(mesh, gradients, targets[r] - volumes[r]) || moved;
     }
     if (!moved) break;

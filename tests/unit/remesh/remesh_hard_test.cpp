@@ -159,6 +159,34 @@ TEST_P(RemeshBall, KeepsTheVolumeWhereAsked) {
   }
 }
 
+/// A ball pressed flat on two sides: volume comes back where the surface is round, the flat sides do not move.
+TEST_P(RemeshBall, KeepsTheVolumeWithoutBulgingFlatSides) {
+  const int dimension = GetParam();
+  constexpr Real height = 0.8;
+  RemeshMesh mesh = ball_mesh(dimension, dimension == 2 ? 32 : 12);
+  const auto up = static_cast<std::size_t>(dimension) - 1;
+  for (LocalId v = 0; v < mesh.nodes(); ++v) {
+    Real* x = &mesh.coordinates[static_cast<std::size_t>(v * dimension)];
+    const Real steepness = std::abs(x[up]) / std::max(radius_of(mesh, v), 1e-300);
+    for (int i = 0; i < dimension && steepness > height; ++i) x[i] *= height / steepness;
+  }
+  const Real before = signed_volume(mesh);
+  RemeshOptions options;
+  options.feature_angle = 80;
+  options.keep_volume = true;
+  remesh(mesh, Metric::uniform(0.2), options);
+  EXPECT_NEAR(signed_volume(mesh), before, 1e-12 * before);
+  int on_flat = 0;
+  for (std::size_t i = up; i < mesh.coordinates.size(); i += up + 1) {
+    Real aside = 0;
+    for (std::size_t c = 1; c <= up; ++c) aside = std::max(aside, std::abs(mesh.coordinates[i - c]));
+    if (aside > 0.25 || std::abs(mesh.coordinates[i]) < height - 0.05) continue;
+    EXPECT_NEAR(std::abs(mesh.coordinates[i]), height, 1e-12);
+    ++on_flat;
+  }
+  EXPECT_GE(on_flat, 4);
+}
+
 TEST_P(RemeshBall, StaysWithinTheHausdorffBound) {
   const int dimension = GetParam();
   RemeshMesh mesh = ball_mesh(dimension, dimension == 2 ? 32 : 12);
