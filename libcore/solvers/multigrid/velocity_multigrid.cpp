@@ -75,6 +75,10 @@ Ownership coarse_ownership(const Communicator& comm, LocalId count, const Multig
   return {comm, mine};
 }
 
+/// Aggregates are made anew with half the threshold where they hold fewer nodes than so many, that often.
+constexpr GlobalId slow_coarsening = 3;
+constexpr int most_thresholds = 5;
+
 template <class T>
 class SmoothedAggregation final : public VelocityMultigrid {
  public:
@@ -151,9 +155,16 @@ class SmoothedAggregation final : public VelocityMultigrid {
   bool coarsen(MultigridLevel& level, const NodeConstraints* constraints, MultigridLevel& next,
                Prolongator& prolongator) {
     if (level.left_out.empty()) level.left_out.assign(index(level.graph.rows()), false);
-    const Aggregates aggregates =
-        aggregate(level.layout, level.graph, level.values, dim_, settings_.threshold, level.left_out);
-    const GlobalId total = comm_.sum(static_cast<GlobalId>(aggregates.count));
+    Real threshold = settings_.threshold;
+    Aggregates aggregates;
+    GlobalId total = 0;
+    // Where strong couplings are rare (stiff bodies, contacts) weaker ones count too: a coarsest level that is large
+    // costs more in its direct solve than all the rest.
+    for (int attempt = 0; attempt < most_thresholds; ++attempt, threshold /= 2) {
+      aggregates = aggregate(level.layout, level.graph, level.values, dim_, threshold, level.left_out);
+      total = comm_.sum(static_cast<GlobalId>(aggregates.count));
+      if (slow_coarsening * total <= summary_.back().nodes) break;
+    }
     if (total == 0 || 10 * total > 8 * summary_.back().nodes) return false;
     estimate_largest_eigenvalue(comm_, level);
     const int modes = coarse_modes(dim_, settings_.rigid_modes);
