@@ -40,16 +40,16 @@ Point<D> inward_normal(const WorkingMesh<D, Metric>& mesh, const FreeFace<D>& fa
   }
 }
 
-/// [vertex] those of faces with a vertex about which the surface is flat: resampling lost nothing there, and what is
-/// flat within a curved patch is pressed flat by something (a tool), which a shift would run into. None where that
-/// leaves nothing else.
+/// [vertex] those of faces with a vertex inside its patch about which the surface is flat: resampling lost nothing
+/// there, and what is flat within a curved patch is pressed flat by something (a tool), which a shift would run into.
+/// None where that leaves nothing else.
 template <int D, class Metric>
 std::vector<char> flat_parts(const WorkingMesh<D, Metric>& mesh, const std::vector<FreeFace<D>>& faces) {
   constexpr Real parallel = 1 - 5e-7;  // cosine of a thousandth
   std::vector<Point<D>> first(mesh.points.size(), Point<D>{});
   std::vector<char> is_flat(mesh.points.size(), 0);
   for (const auto& face : faces) {
-    for (const LocalId v : face.node) is_flat[static_cast<std::size_t>(v)] = 1;
+    for (const LocalId v : face.node) is_flat[static_cast<std::size_t>(v)] = mesh.vertex(v).dimension == D - 1 ? 1 : 0;
   }
   for (const auto& face : faces) {
     const Point<D> normal = normalized(inward_normal<D, Metric>(mesh, face));
