@@ -79,13 +79,16 @@ RemeshedScene ForgeProcess::remeshed_scene() {
     lent.kept_regions.push_back(body.is_deformable() && !stays ? 0 : 1);
   }
   lent.mesh_changed = [this] { mesh_changed(); };
+  lent.made_anew = [this] {
+    scene_->boundaries->mesh_changed();
+    push_out_of_tools(*scene_);
+  };
   return lent;
 }
 
 /// A remesh moves free surfaces within their curvature and ends the history of the time scheme.
 void ForgeProcess::mesh_changed() {
   scene_->boundaries->mesh_changed();
-  push_out_of_tools(*scene_);
   flow_.remeshed();
   scene_->progress.last_step = 0;
   const std::vector<Real> volumes = body_volumes(*scene_);

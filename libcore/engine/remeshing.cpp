@@ -149,6 +149,7 @@ Outcome Remeshing::remesh(const Increment& increment, const Metric& metric) {
   quality_after_ = report.after.quality_min;
   remeshed_in_ = increment.number;
   ++times_;
+  if (scene_.made_anew) scene_.made_anew();
   scene_.mesh_changed();
   log::info("remeshed: {} nodes (before: {}), quality min {:.2f}, mean {:.2f} (before: {:.2f}, {:.2f}), {:.1f} s",
             report.nodes_after, report.nodes_before, report.after.quality_min, report.after.quality_mean,

@@ -29,6 +29,8 @@ struct RemeshedScene {
   std::function<void()> before;
   /// Everything built on the mesh is to be built anew. Collective.
   std::function<void()> mesh_changed;
+  /// After a remesh that succeeded, before mesh_changed(): may move nodes of the new mesh.
+  std::function<void()> made_anew = {};
 };
 
 /// Stands first among the components: the increment is solved on the new mesh. The mesh is made anew every N

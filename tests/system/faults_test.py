@@ -66,8 +66,12 @@ class LongRuns(unittest.TestCase):
         self.assertEqual(digits(one), digits(other))
 
     def assert_near(self, one, other, tolerance=1e-2):
-        """Last rows agree as far as they can: on other ranks the meshes that are made anew are others."""
-        a, b = (dict(zip(rows[0], rows[-1])) for rows in (digits(one), digits(other)))
+        """Rows of the same increment agree as far as they can: on other ranks the meshes that are made anew are others, and of the
+        last steps of a filling one may be halved."""
+        rows = digits(one), digits(other)
+        last = min(map(len, rows)) - 4
+        self.assertLessEqual(max(map(len, rows)), last + 6)
+        a, b = (dict(zip(each[0], each[last])) for each in rows)
         for column in ("time_s", "volume_m3", "force_upper_y_N", "fill_fraction", "pressure_gate_Pa"):
             if column in a:
                 self.assertAlmostEqual(float(a[column]) / float(b[column]), 1, delta=tolerance, msg=column)
