@@ -156,17 +156,6 @@ Outcome ContactFlow::run_stages(const Increment& increment) {
   return Outcome::done();
 }
 
-bool ContactFlow::has_turned_elements() const {
-  bool turned = false;
-  with_dim(scene_.mesh.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (LocalId e = 0; e < scene_.mesh.elements() && !turned; ++e) {
-      turned = !(simplex_volume<D>(simplex_points<D>(scene_.mesh, e)) > 0);
-    }
-  });
-  return scene_.comm->any(turned);
-}
-
 Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first) {
   std::vector<std::vector<Real>> at_start;
   for (const Field* field : std::as_const(scene_.fields).all()) {
@@ -177,7 +166,7 @@ Outcome ContactFlow::run_midpoint(const Increment& increment, const Stage& first
   for (std::size_t i = 0; i < scene_.mesh.coordinates.size(); ++i) {
     scene_.mesh.coordinates[i] = first.start[i] + 0.5 * increment.dt * scene_.step_velocity[i];
   }
-  if (has_turned_elements()) return Outcome::retry("an element would turn over within the step");
+  if (has_turned_elements(scene_)) return Outcome::retry("an element would turn over within the step");
   Stage stage = first;
   stage.time = increment.start() + 0.5 * increment.dt;
   for (Tool& tool : scene_.tools) tool.plan(stage.start_time, stage.displacement, stage.time);

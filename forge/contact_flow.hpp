@@ -128,7 +128,6 @@ class ContactFlow final : public Component {
   Outcome run_stages(const Increment& increment);
   Outcome check_room(Real time) const;
   Outcome check_blows(Real dt) const;
-  bool has_turned_elements() const;
   Outcome run_midpoint(const Increment& increment, const Stage& first);
   Outcome solve_under_presses(Stage& stage);
   bool any_press(const std::function<bool(const Press&)>& is) const;

@@ -20,6 +20,8 @@ constexpr Real share_at_end = 0.36;  // a fifth of the speed
 /// many.
 constexpr Real crawling = 1e-3;
 constexpr int most_bracketed = 8;
+/// Of the force as a power of the speed, where nothing is known of it.
+constexpr Real usual_exponent = 0.3;
 /// So many times its limit tells that a die has closed in the increment.
 constexpr Real overload = 2;
 
@@ -135,7 +137,6 @@ void Press::forget_trials() {
 /// The next speed to try: by the power law through what was tried, kept within the bracket where there is one.
 Real Press::next_speed(Real full) {
   constexpr Real creeping = 1e-7;  // of the full speed
-  constexpr Real usual_exponent = 0.3;
   const Real limit = spec_.force_limit;
   if (slow_ && fast_) return within_bracket();
   if (fast_) return slower(full);
@@ -164,7 +165,6 @@ Real Press::within_bracket() {
 /// much faster than by any power of the speed, in one that is full linearly, by what the contacts' penalties give way;
 /// a full die may push the press back by a little.
 Real Press::slower(Real full) const {
-  constexpr Real usual_exponent = 0.3;
   constexpr Real least_share = 0.3;
   constexpr Real largest_retreat = 0.02;
   constexpr Real nudge = 1e-5;

@@ -14,9 +14,11 @@ constexpr int most_plans = 25;  ///< of a hydraulic press
 /// Solves under a press at its force limit are so much sharper: the pressure of a full die hangs on the last digits of
 /// the volume that flows.
 constexpr Real sharper = 1e-2;
-/// Of the power of tools, that the penalties of contacts may take: it is some 2 / c where bodies flow.
-constexpr Real largest_lost = 0.03;
-constexpr Real least_lost = 10;
+/// Of the power of tools, that the penalties of contacts may take: some times the 2 / c that they take where bodies
+/// flow, within bounds.
+constexpr Real tolerated_loss = 10;  // over c
+constexpr Real least_tolerated_loss = 0.03;
+constexpr Real largest_tolerated_loss = 0.5;
 /// Times the flow stress, that tools press on the mean where nothing flows.
 constexpr Real enormous = 50;
 /// A step of a blow may be so many times as long as the force of the increment allows.
@@ -39,7 +41,8 @@ Outcome ContactFlow::check_room(Real time) const {
       pressure = std::max(pressure, report_.tool_forces[t].norm() / report_.contact_areas[t]);
   }
   const Real given = std::abs(report_.power.tools + report_.power.imposed);
-  const Real tolerated = std::clamp(least_lost / scene_.penalty.penalty, largest_lost, 0.5);
+  const Real tolerated =
+      std::clamp(tolerated_loss / scene_.penalty.penalty, least_tolerated_loss, largest_tolerated_loss);
   if (pressure < enormous * stress || !(report_.lost_power > tolerated * given)) return Outcome::done();
   return Outcome::fail(fmt::format(
       "the die is full: the tools press with {:.0f} times the flow stress, and {:.0f} % of their power goes "

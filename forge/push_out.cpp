@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/log.hpp"
-#include "mesh/simplex.hpp"
 
 namespace malleus::forge {
 namespace {
@@ -33,17 +32,6 @@ Vector way_out(const std::vector<Tool>& tools, const Vector& point, Real edge) {
   return way;
 }
 
-bool any_turned(const Scene& scene) {
-  bool turned = false;
-  with_dim(scene.mesh.dim, [&](auto d) {
-    constexpr int D = decltype(d)::value;
-    for (LocalId e = 0; e < scene.mesh.elements() && !turned; ++e) {
-      turned = !(simplex_volume<D>(simplex_points<D>(scene.mesh, e)) > 0);
-    }
-  });
-  return scene.comm->any(turned);
-}
-
 }  // namespace
 
 void push_out_of_tools(Scene& scene) {
@@ -66,7 +54,7 @@ void push_out_of_tools(Scene& scene) {
     }
   }
   scene.mesh.node_halo.update_copies(std::span<Real>(scene.mesh.coordinates), scene.dim());
-  if (any_turned(scene)) {
+  if (has_turned_elements(scene)) {
     scene.mesh.coordinates = before;
   } else if (scene.comm->max(deepest) > 0) {
     log::debug("  nodes that the remesh left in tools, up to {:.2g} edges deep, were put onto them", deepest);

@@ -50,4 +50,15 @@ std::vector<Real> body_volumes(const Scene& scene) {
   return volumes;
 }
 
+bool has_turned_elements(const Scene& scene) {
+  bool turned = false;
+  with_dim(scene.mesh.dim, [&](auto d) {
+    constexpr int D = decltype(d)::value;
+    for (LocalId e = 0; e < scene.mesh.elements() && !turned; ++e) {
+      turned = !(simplex_volume<D>(simplex_points<D>(scene.mesh, e)) > 0);
+    }
+  });
+  return scene.comm->any(turned);
+}
+
 }  // namespace malleus::forge

@@ -97,6 +97,9 @@ void declare_fields(Scene& scene);
 /// Volumes of the bodies [region], m^3 (of the whole revolution; m^2 in plane strain). Collective.
 std::vector<Real> body_volumes(const Scene& scene);
 
+/// Whether an element of the mesh has no positive volume. Collective.
+bool has_turned_elements(const Scene& scene);
+
 /// A case on its mesh: bodies, tools, contacts, scales. The mesh's groups are those of the case. InputError where
 /// elements belong to no body. Collective.
 void build_scene(const Communicator& comm, Mesh mesh, const ForgeCase& forge_case, Scene& scene);

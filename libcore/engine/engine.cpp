@@ -20,7 +20,6 @@ namespace malleus {
 namespace {
 
 constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes take more than seconds to make coarser
-constexpr Real seconds_of_rehearsal = 3;           ///< processor time that --check may spend on a forecast
 // Measured: processor time of writing fields, a rank and a node, and of a checkpoint, a rank.
 constexpr Real output_s = 4e-3;
 constexpr Real output_s_per_node = 2e-6;

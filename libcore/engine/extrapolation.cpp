@@ -11,7 +11,6 @@ namespace {
 
 constexpr Real lowest_order = 1.5;
 constexpr Real highest_order = 2;
-constexpr Real usual_order = 1.75;
 /// Differences that grow faster from mesh to mesh tell that the coarsest is too coarse to tell.
 constexpr Real incredible_order = 3;
 

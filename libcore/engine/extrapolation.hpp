@@ -14,9 +14,12 @@ struct MeshComparison {
   std::vector<std::vector<Real>> results;  ///< [mesh][result]
 };
 
+/// Where nothing shows the order in which errors fall with sizes.
+inline constexpr Real usual_order = 1.75;
+
 /// Order p in R + C h^p that three meshes show, within [1.5, 2]: an element of second order has it on fine meshes, less
-/// where boundary layers are as wide as elements. 1.75 where there are two meshes, or where the results go to and fro.
-/// A third mesh to which the difference grows faster than by the third power is too coarse to count.
+/// where boundary layers are as wide as elements. usual_order where there are two meshes, or where the results go to
+/// and fro. A third mesh to which the difference grows faster than by the third power is too coarse to count.
 Real observed_order(const MeshComparison& comparison);
 
 /// Relative error on the finest mesh: distance of its results from the fit R + C h^p (of three meshes by least squares,

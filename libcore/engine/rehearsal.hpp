@@ -11,6 +11,9 @@
 
 namespace malleus {
 
+/// Processor time that a forecast may take on each kind of mesh, s.
+inline constexpr Real seconds_of_rehearsal = 3;
+
 /// How a run goes on and ends, as [time] says. Times in s.
 struct RunPlan {
   Real step = std::numeric_limits<Real>::infinity();

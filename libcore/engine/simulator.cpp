@@ -23,8 +23,6 @@
 namespace malleus {
 namespace {
 
-constexpr Real seconds_of_rehearsal = 3;  ///< processor time, for target_time
-
 std::string level_name(Level level) {
   return std::string(level_names[static_cast<std::size_t>(level)]);
 }

@@ -20,9 +20,6 @@ namespace {
 constexpr std::array<Real, 2> coarsenings = {2, 1.5};
 constexpr Real least_ratio = 1.2;  ///< of mean sizes: below it two meshes do not tell apart
 constexpr std::array<GlobalId, 4> fewest_elements = {0, 0, 8, 30};  ///< [dimension] of a mesh that says something
-constexpr Real usual_order = 1.75;
-constexpr GlobalId fewest_rehearsed =
-    16;  ///< elements of a mesh that is run ahead itself: on fewer a run may do anything
 
 Real size_ratio(const Mesh& fine, const Mesh& coarse) {
   return std::pow(static_cast<Real>(fine.total_elements) / static_cast<Real>(coarse.total_elements), 1.0 / fine.dim);
@@ -170,9 +167,7 @@ std::optional<Outlook> SpaceEstimate::look_ahead(Process& process, const RunPlan
     seen.push_back(std::move(*rehearsal));
   }
   twins_.clear();
-  const bool says_something = process.mesh().total_elements >= fewest_rehearsed;
-  if (seen.empty() && factory_ && most_s > 0 &&
-      says_something) {  // no coarser mesh holds the scene: its own tells time, but nothing of its error
+  if (seen.empty() && factory_ && most_s > 0) {  // no coarser mesh holds it: its own tells time, but not its error
     const auto own = rehearse(comm_, process, plan, most_s);
     if (own) return outlook_on(*own, plan.is_steady());
   }

@@ -3,25 +3,9 @@
 #include <algorithm>
 
 #include "fem/element_loop.hpp"
-#include "parallel/petsc.hpp"
+#include "parallel/petsc_shell.hpp"
 
 namespace malleus {
-namespace {
-
-PetscErrorCode multiply_shell(Mat shell, Vec x, Vec y) {
-  void* context = nullptr;
-  PetscCall(MatShellGetContext(shell, &context));
-  const PetscScalar* from = nullptr;
-  PetscScalar* to = nullptr;
-  PetscCall(VecGetArrayRead(x, &from));
-  PetscCall(VecGetArray(y, &to));
-  static_cast<MatrixFreeTangent*>(context)->multiply(from, to);
-  PetscCall(VecRestoreArray(y, &to));
-  PetscCall(VecRestoreArrayRead(x, &from));
-  return 0;
-}
-
-}  // namespace
 
 MatrixFreeTangent::MatrixFreeTangent(const Communicator& comm, const Mesh& mesh, const NodeConstraints& constraints,
                                      MatrixFreeCoefficients coefficients)
@@ -29,13 +13,7 @@ MatrixFreeTangent::MatrixFreeTangent(const Communicator& comm, const Mesh& mesh,
   const int size = mesh.dim + 1;
   in_.resize(static_cast<std::size_t>(mesh.nodes()) * static_cast<std::size_t>(size));
   out_.resize(in_.size());
-  const PetscInt rows = mesh.owned_nodes() * size;
-  petsc_call(MatCreateShell(comm.raw(), rows, rows, PETSC_DETERMINE, PETSC_DETERMINE, this, &shell_));
-  petsc_call(MatShellSetOperation(shell_, MATOP_MULT, reinterpret_cast<void (*)()>(multiply_shell)));
-}
-
-MatrixFreeTangent::~MatrixFreeTangent() {
-  MatDestroy(&shell_);
+  shell_ = PetscOwner<Mat, MatDestroy>(make_shell_matrix(comm.raw(), mesh.owned_nodes() * size, *this));
 }
 
 template <int D>

@@ -9,6 +9,7 @@
 
 #include "fem/node_constraints.hpp"
 #include "mesh/mesh.hpp"
+#include "parallel/petsc.hpp"
 
 namespace malleus {
 
@@ -32,9 +33,8 @@ class MatrixFreeTangent {
                     MatrixFreeCoefficients coefficients);
   MatrixFreeTangent(const MatrixFreeTangent&) = delete;
   MatrixFreeTangent& operator=(const MatrixFreeTangent&) = delete;
-  ~MatrixFreeTangent();
 
-  Mat matrix() const { return shell_; }
+  Mat matrix() const { return shell_.get(); }
   /// y = K x, [owned node][dim+1]. Collective among neighbours.
   void multiply(const Real* x, Real* y);
 
@@ -46,7 +46,7 @@ class MatrixFreeTangent {
   const NodeConstraints& constraints_;
   MatrixFreeCoefficients coefficients_;
   std::vector<Real> in_, out_;  ///< [local node][dim+1]
-  Mat shell_ = nullptr;
+  PetscOwner<Mat, MatDestroy> shell_;
 };
 
 }  // namespace malleus

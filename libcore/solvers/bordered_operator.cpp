@@ -2,23 +2,9 @@
 
 #include <algorithm>
 
+#include "parallel/petsc_shell.hpp"
+
 namespace malleus {
-namespace {
-
-PetscErrorCode multiply_shell(Mat shell, Vec x, Vec y) {
-  void* context = nullptr;
-  PetscCall(MatShellGetContext(shell, &context));
-  const PetscScalar* from = nullptr;
-  PetscScalar* to = nullptr;
-  PetscCall(VecGetArrayRead(x, &from));
-  PetscCall(VecGetArray(y, &to));
-  static_cast<const BorderedOperator*>(context)->multiply(from, to);
-  PetscCall(VecRestoreArray(y, &to));
-  PetscCall(VecRestoreArrayRead(x, &from));
-  return 0;
-}
-
-}  // namespace
 
 BorderedOperator::BorderedOperator(const LinearSystem& system)
     : system_(system),
@@ -32,8 +18,7 @@ BorderedOperator::BorderedOperator(const LinearSystem& system)
 void BorderedOperator::make_shell() {
   const auto nodes = static_cast<PetscInt>(node_unknowns_);
   const PetscInt local = nodes + (holds_borders_ ? borders() : 0);
-  petsc_call(MatCreateShell(system_.comm->raw(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this, shell_.out()));
-  petsc_call(MatShellSetOperation(shell_.get(), MATOP_MULT, reinterpret_cast<void (*)()>(multiply_shell)));
+  shell_ = PetscMatrix(make_shell_matrix(system_.comm->raw(), local, *this));
   petsc_call(MatSetOption(shell_.get(), MAT_SYMMETRIC, PETSC_TRUE));
   for (PetscVector* inner : {&inner_x_, &inner_y_}) {
     petsc_call(VecCreateMPIWithArray(system_.comm->raw(), system_.block_size(), nodes, PETSC_DETERMINE, nullptr,

@@ -3,23 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "parallel/petsc_shell.hpp"
+
 namespace malleus {
-namespace {
-
-PetscErrorCode apply_shell(PC pc, Vec residual, Vec correction) {
-  void* context = nullptr;
-  PetscCall(PCShellGetContext(pc, &context));
-  const PetscScalar* from = nullptr;
-  PetscScalar* to = nullptr;
-  PetscCall(VecGetArrayRead(residual, &from));
-  PetscCall(VecGetArray(correction, &to));
-  static_cast<BorderedPreconditioner*>(context)->apply(from, to);
-  PetscCall(VecRestoreArray(correction, &to));
-  PetscCall(VecRestoreArrayRead(residual, &from));
-  return 0;
-}
-
-}  // namespace
 
 Eigen::MatrixXd symmetric_pseudo_inverse(const Eigen::MatrixXd& matrix, bool absolute) {
   if (matrix.size() == 0) return matrix;
@@ -78,7 +64,7 @@ void BorderedPreconditioner::apply(const Real* residual, Real* correction) {
 void use_bordered_preconditioner(PC pc, BorderedPreconditioner& preconditioner) {
   petsc_call(PCSetType(pc, PCSHELL));
   petsc_call(PCShellSetContext(pc, &preconditioner));
-  petsc_call(PCShellSetApply(pc, apply_shell));
+  petsc_call(PCShellSetApply(pc, apply_shell<BorderedPreconditioner>));
   petsc_call(PCShellSetName(pc, "border elimination"));
 }
 

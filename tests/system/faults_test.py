@@ -62,6 +62,15 @@ class LongRuns(unittest.TestCase):
         check_sound(output, program)
         return output
 
+    def mounted(self, name, options):
+        """A file system of its own in memory."""
+        place = self.directory / name
+        place.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", place], capture_output=True).returncode != 0:
+            self.skipTest("no file system can be mounted here")
+        self.addCleanup(subprocess.run, ["umount", place], check=True)
+        return place
+
     def assert_same_digits(self, one, other):
         self.assertEqual(digits(one), digits(other))
 
@@ -226,12 +235,7 @@ class Disks(LongRuns):
             case = write_case(program, self.directory, self.INCREMENTS)
             for kilobytes, ranks in ((40, 1), (100, 1), (160, 2), (300, 2)):
                 with self.subTest(program=program, kilobytes=kilobytes, ranks=ranks):
-                    place = self.directory / f"disk-{program}-{kilobytes}"
-                    place.mkdir()
-                    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", place]
-                    if subprocess.run(mount, capture_output=True).returncode != 0:
-                        self.skipTest("no file system can be mounted here")
-                    self.addCleanup(subprocess.run, ["umount", place], check=True)
+                    place = self.mounted(f"disk-{program}-{kilobytes}", f"size={kilobytes}k")
                     code, said = finish(start(program, case, place / "out", ranks=ranks))
                     self.assertEqual(code, 4, said)
                     self.assertIn("No space left on device", said)
@@ -251,11 +255,7 @@ class Disks(LongRuns):
     def test_a_directory_that_may_no_longer_be_written(self):
         case = write_case("forge", self.directory, self.INCREMENTS)
         whole = self.run_to_end("forge", case, "whole", ranks=2)
-        place = self.directory / "disk"
-        place.mkdir()
-        if subprocess.run(["mount", "-t", "tmpfs", "tmpfs", place], capture_output=True).returncode != 0:
-            self.skipTest("no file system can be mounted here")
-        self.addCleanup(subprocess.run, ["umount", place], check=True)
+        place = self.mounted("disk", "size=64m")
         code, said = finish(start("forge", case, place / "out", "--steps", "5", ranks=2))
         self.assertEqual(code, 0, said)
         subprocess.run(["mount", "-o", "remount,ro", place], check=True)
