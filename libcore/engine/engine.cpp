@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "engine/increments.hpp"
 #include "engine/petsc_options.hpp"
 #include "engine/report.hpp"
 #include "engine/resources.hpp"
@@ -24,7 +25,6 @@ constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes ta
 constexpr Real output_s = 4e-3;
 constexpr Real output_s_per_node = 2e-6;
 constexpr Real checkpoint_s = 15e-3;
-constexpr int most_cuts = 12;           ///< of one increment's step, each to a half
 constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
 /// Times the last increment and the longest checkpoint, kept free before the wall time ends.
 constexpr Real wall_time_margin = 1.3;
@@ -274,11 +274,8 @@ bool Engine::is_over() {
 
 /// The step is what the case and the physics allow, shortened so that the end is met in equal steps.
 Increment Engine::next_increment() {
-  Real dt = std::min({settings_.step, process_.largest_step(), next_dt_limit_});
-  const Real remaining = settings_.end - last_.time;
-  if (std::isfinite(remaining)) {
-    dt = std::isfinite(dt) ? remaining / std::max(1.0, std::ceil(remaining / dt - 1e-9)) : remaining;
-  }
+  const Real allowed = std::min({settings_.step, process_.largest_step(), next_dt_limit_});
+  const Real dt = planned_step(allowed, last_.time, settings_.end);
   if (!std::isfinite(dt)) throw InputError("[time]: nothing limits the step: give [time] step or end");
   if (!(dt > 0)) throw Defect("the next step is not positive", std::source_location::current());
   return {last_.number + 1, last_.time + dt, dt};
@@ -300,7 +297,9 @@ std::optional<std::string> Engine::make_increment() {
   const bool is_compared = begin_estimate();
   Increment increment = next_increment();
   for (int cut = 0;; ++cut) {
-    const Outcome outcome = try_increment(increment);
+    const Outcome outcome = try_components(process_, [&](Component& component) {
+      return timed(component.name(), [&] { return component.advance(increment); });
+    });
     if (outcome.kind == Outcome::Kind::done) {
       next_dt_limit_ = cut > 0 || std::isfinite(next_dt_limit_) ? increment.dt * growth_after_cut
                                                                 : std::numeric_limits<Real>::infinity();
@@ -310,25 +309,9 @@ std::optional<std::string> Engine::make_increment() {
       return std::nullopt;
     }
     if (outcome.kind == Outcome::Kind::failed || cut == most_cuts) return outcome.why;
-    const bool tells_step = outcome.step > 0 && outcome.step < increment.dt;
-    increment.dt = tells_step ? outcome.step : increment.dt / 2;
+    increment = shortened(increment, last_.time, outcome);
     log::info("increment {}: {}; the step is cut to {:.3g} s", increment.number, outcome.why, increment.dt);
-    increment.time = last_.time + increment.dt;
   }
-}
-
-Outcome Engine::try_increment(const Increment& increment) {
-  std::vector<Component*> done;
-  for (Component* component : process_.components()) {
-    const Outcome outcome = timed(component->name(), [&] { return component->advance(increment); });
-    if (outcome.kind == Outcome::Kind::done) {
-      done.push_back(component);
-      continue;
-    }
-    for (auto undone = done.rbegin(); undone != done.rend(); ++undone) (*undone)->roll_back();
-    return {outcome.kind, component->name() + ": " + outcome.why, outcome.step};
-  }
-  return Outcome::done();
 }
 
 void Engine::record(const Increment& increment) {

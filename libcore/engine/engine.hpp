@@ -67,7 +67,6 @@ class Engine {
   int solve_once();
   bool is_over();
   Increment next_increment();
-  Outcome try_increment(const Increment& increment);
   std::optional<std::string> make_increment();
   bool begin_estimate();
   Real progress() const;

@@ -5,12 +5,11 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "engine/increments.hpp"
 #include "engine/resources.hpp"
 
 namespace malleus {
 namespace {
-
-constexpr int most_cuts = 12;  ///< of one increment's step, each to a half
 
 bool is_over(Process& process, const RunPlan& plan, const Increment& last) {
   if (process.finished()) return true;
@@ -28,27 +27,21 @@ Real progress_of(Process& process, const RunPlan& plan, const Increment& last) {
 }
 
 std::optional<Increment> next_increment(Process& process, const RunPlan& plan, const Increment& last) {
-  Real dt = std::min(plan.step, process.largest_step());
-  const Real remaining = plan.end - last.time;
-  if (std::isfinite(remaining)) {
-    dt = std::isfinite(dt) ? remaining / std::max(1.0, std::ceil(remaining / dt - 1e-9)) : remaining;
-  }
+  const Real dt = planned_step(std::min(plan.step, process.largest_step()), last.time, plan.end);
   if (!std::isfinite(dt) || !(dt > 0)) return std::nullopt;
   return Increment{last.number + 1, last.time + dt, dt};
 }
 
-Outcome try_once(Process& process, const Increment& increment) {
-  std::vector<Component*> done;
-  for (Component* component : process.components()) {
-    const Outcome outcome = component->advance(increment);
-    if (outcome.kind == Outcome::Kind::done) {
-      done.push_back(component);
-      continue;
-    }
-    for (auto undone = done.rbegin(); undone != done.rend(); ++undone) (*undone)->roll_back();
-    return outcome;
+/// A step tried with less and less where components ask for it; none where it fails. Collective.
+std::optional<Increment> advance_silently(Process& process, Increment increment) {
+  const Real start = increment.start();
+  for (int cut = 0; cut <= most_cuts; ++cut) {
+    const Outcome outcome = try_components(process, [&](Component& component) { return component.advance(increment); });
+    if (outcome.kind == Outcome::Kind::done) return increment;
+    if (outcome.kind == Outcome::Kind::failed) return std::nullopt;
+    increment = shortened(increment, start, outcome);
   }
-  return Outcome::done();
+  return std::nullopt;
 }
 
 std::optional<Rehearsal> rehearse_steady(const Communicator& comm, Process& process) {
@@ -101,19 +94,6 @@ Real time_on(const std::vector<Rehearsal>& seen, Real Rehearsal::*time, Real nod
 }
 
 }  // namespace
-
-std::optional<Increment> advance_silently(Process& process, Increment increment) {
-  const Real start = increment.start();
-  for (int cut = 0; cut <= most_cuts; ++cut) {
-    const Outcome outcome = try_once(process, increment);
-    if (outcome.kind == Outcome::Kind::done) return increment;
-    if (outcome.kind == Outcome::Kind::failed) return std::nullopt;
-    const bool tells_step = outcome.step > 0 && outcome.step < increment.dt;
-    increment.dt = tells_step ? outcome.step : increment.dt / 2;
-    increment.time = start + increment.dt;
-  }
-  return std::nullopt;
-}
 
 std::optional<Rehearsal> rehearse(const Communicator& comm, Process& process, const RunPlan& plan, Real most_s) {
   const log::Silence silence;

@@ -34,9 +34,6 @@ struct Rehearsal {
   std::vector<Real> results;  ///< after the first increment
 };
 
-/// A step tried with less and less where components ask for it; none where it fails. Collective.
-std::optional<Increment> advance_silently(Process& process, Increment increment);
-
 /// Runs a process that has not started, without any output, to its end or until most_s processor seconds are spent.
 /// None where it cannot be set up or fails in its first increment. Collective.
 std::optional<Rehearsal> rehearse(const Communicator& comm, Process& process, const RunPlan& plan, Real most_s);
