@@ -20,7 +20,7 @@ class Failures(unittest.TestCase):
         self.addCleanup(scratch.cleanup)
         self.directory = pathlib.Path(scratch.name)
 
-    def fail(self, program, case, rank, phase, call, kind="storage"):
+    def fail_at(self, program, case, rank, phase, call, kind="storage"):
         """What was said by a run in which that rank fails; None where it never came to that call."""
         began = time.monotonic()
         environment = {**os.environ, "MALLEUS_FAIL_AT": f"{rank}:{phase}:{call}:{kind}"}
@@ -37,7 +37,7 @@ class Failures(unittest.TestCase):
         for program in PROGRAMS:
             case = write_case(program, self.directory, 4)
             call, passed = 1, 0
-            while self.fail(program, case, call % RANKS, "agreement", call) is not None:
+            while self.fail_at(program, case, call % RANKS, "agreement", call) is not None:
                 passed += 1
                 call += 1 + call // 2
             with self.subTest(program):
@@ -47,7 +47,7 @@ class Failures(unittest.TestCase):
         case = write_case("inject", self.directory, 4)
         for kind in CODES:
             with self.subTest(kind):
-                said = self.fail("inject", case, 1, "agreement", 5, kind)
+                said = self.fail_at("inject", case, 1, "agreement", 5, kind)
                 if kind in ("storage", "input"):
                     self.assertEqual(said.count("MALLEUS_FAIL_AT: rank"), 1)
 
@@ -57,11 +57,11 @@ class Failures(unittest.TestCase):
             program = PROGRAMS[number % 2]
             with self.subTest(phase):
                 case = write_case(program, self.directory, 4)
-                self.assertIsNotNone(self.fail(program, case, 1, phase, 2, list(CODES)[number]))
+                self.assertIsNotNone(self.fail_at(program, case, 1, phase, 2, list(CODES)[number]))
 
     def test_a_failed_run_goes_on(self):
         case = write_case("forge", self.directory, 6)
-        self.assertIsNotNone(self.fail("forge", case, 1, "flow", 5))
+        self.assertIsNotNone(self.fail_at("forge", case, 1, "flow", 5))
         code, said = finish(start("forge", case, self.directory / "out", "--restart", ranks=RANKS))
         self.assertEqual(code, 0, said)
         self.assertEqual(json.loads((self.directory / "out" / "summary.json").read_text())["status"], "done")

@@ -32,6 +32,15 @@ class Results(unittest.TestCase):
         run("inject", case, self.directory / "out", *options)
         return self.directory / "out"
 
+    def test_a_front_of_endless_substeps_is_refused(self):
+        channel_mesh(self.directory / "channel.msh", 4)
+        case = self.directory / "case.ini"
+        case.write_text(CHANNEL + AIR + "[time]\nend = 0.1\nstep = 0.05\n[front]\ncfl = 1e-5\n")
+        for ranks in (1, 3):
+            refused = run("inject", case, self.directory / "refused", ranks=ranks, check=False)
+            self.assertEqual(refused.returncode, 3)
+            self.assertRegex(refused.stderr, "front would need .* substeps .* shorten")
+
     def test_fronts_that_meet_leave_a_weld_line(self):
         channel_mesh(self.directory / "channel.msh", 6)
         other = f"[inlet.other]\ngroup = cavity_x_high\nfluid = polymer\nflow_rate = {U * H}\n"
