@@ -16,6 +16,7 @@
 #include "engine/run_guarded.hpp"
 #include "engine/stop_request.hpp"
 #include "engine/targets.hpp"
+#include "parallel/petsc_session.hpp"
 #include "partition/balance.hpp"
 #include "partition/scotch_start.hpp"
 #include "remesh/distributed.hpp"
@@ -244,10 +245,11 @@ int answer(const Communicator& comm, Simulator& simulator, const std::vector<std
 }
 
 int run_simulator(int argc, char** argv, Simulator& simulator) {
-  return run_guarded(argc, argv, [&](const Communicator& comm, const std::vector<std::string>& arguments) {
+  const auto program = [&](const Communicator& comm, const std::vector<std::string>& arguments) {
     listen_for_stop_signals();
     return answer(comm, simulator, arguments);
-  });
+  };
+  return run_guarded(argc, argv, program, start_petsc);
 }
 
 }  // namespace malleus

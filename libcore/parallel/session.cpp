@@ -1,36 +1,18 @@
 #include "parallel/session.hpp"
 
 #include <fmt/format.h>
-#include <petscsys.h>
+#include <petscversion.h>
 
 namespace malleus {
-namespace {
 
-/// PETSc reads its options from an argument vector whose first word is the program's name.
-void start_petsc(const char* program, const std::vector<std::string>& options) {
-  std::vector<std::string> words = {program};
-  words.insert(words.end(), options.begin(), options.end());
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  int count = static_cast<int>(words.size());
-  char** arguments = pointers.data();
-  PetscInitialize(&count, &arguments, nullptr, nullptr);
-  PetscPopSignalHandler();
-}
-
-}  // namespace
-
-Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options) {
+Session::Session(int& argc, char**& argv) {
   MPI_Init(&argc, &argv);
   MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_ARE_FATAL);
-  start_petsc(argc > 0 ? argv[0] : "malleus", petsc_options);
   world_ = std::make_unique<Communicator>(MPI_COMM_WORLD);
 }
 
 Session::~Session() {
   world_.reset();
-  PetscFinalize();
   MPI_Finalize();
 }
 

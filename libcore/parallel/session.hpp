@@ -1,20 +1,18 @@
 #pragma once
 
-/// Start and end of MPI and PETSc for a process.
+/// Start and end of MPI for a process.
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "parallel/communicator.hpp"
 
 namespace malleus {
 
-/// Starts MPI and PETSc at construction and ends them at destruction. One per process.
+/// Starts MPI at construction and ends it at destruction. One per process.
 class Session {
  public:
-  /// petsc_options: what the user gave after `--`, as words.
-  Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options);
+  Session(int& argc, char**& argv);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session();

@@ -59,6 +59,8 @@ class Operators {
   /// Turns an edge (2D) where that brings the numbers of triangles at its four vertices nearer to the ideal, at some
   /// expense of shape that relocation makes good.
   bool balance(LocalId element, std::size_t edge);
+  /// Before a pass of balance().
+  void count_surplus();
   /// Moves a vertex where its elements become better.
   bool relocate(LocalId v);
 
@@ -89,7 +91,6 @@ class Operators {
   Real ring_key(LocalId a, LocalId b, std::size_t from, Real limit) const;
   Real pair_key(const Element<D>& element, std::size_t face, LocalId beyond, Real limit) const;
   void note_tried(LocalId a, LocalId b);
-  int surplus(LocalId v);
   bool edge_exists(LocalId a, LocalId b);
   std::size_t edge_of(LocalId e, LocalId a, LocalId b) const;
   void note_ball(LocalId v);
@@ -114,6 +115,7 @@ class Operators {
   BallShape<D> ball_;  ///< of the vertex that relocation looks at
   std::vector<float> keys_;
   std::vector<LocalId> around_;
+  std::vector<float> surplus_;  ///< [vertex] triangles beyond the ideal number (2D, for balance)
 };
 
 }  // namespace malleus::remeshing

@@ -155,6 +155,7 @@ void Remesher<D, Metric>::swap_pass(Real key) {
 /// Turns edges towards six triangles at each vertex (three at the boundary).
 template <int D, class Metric>
 void Remesher<D, Metric>::balance_pass() {
+  operators_.count_surplus();
   for (std::size_t e = 0; e < mesh_.elements.size(); ++e) {
     for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
       if (mesh_.elements[e].is_live()) operators_.balance(static_cast<LocalId>(e), edge);

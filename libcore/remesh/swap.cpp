@@ -168,12 +168,19 @@ bool Operators<D, Metric>::swap_edge(LocalId e, std::size_t edge) {
   return false;
 }
 
-/// Triangles at a vertex beyond the ideal number; 0 where there is none (corners).
+/// Triangles at each vertex beyond the ideal number.
 template <int D, class Metric>
-int Operators<D, Metric>::surplus(LocalId v) {
-  const int dimension = mesh_.vertex(v).dimension;
-  if (dimension == 0 || !cavity_.gather_ball(v)) return 0;
-  return static_cast<int>(cavity_.elements().size()) - (cavity_.is_closed() ? 6 : 3);
+void Operators<D, Metric>::count_surplus() {
+  surplus_.assign(mesh_.vertices.size(), -6);
+  for (const auto& element : mesh_.elements) {
+    if (!element.is_live()) continue;
+    for (std::size_t i = 0; i <= D; ++i) {
+      ++surplus_[static_cast<std::size_t>(element.node[i])];
+      if (element.neighbour[i] != no_face) continue;
+      // Each vertex on the boundary has two open faces there, and wants three triangles.
+      for (std::size_t k = 1; k <= D; ++k) surplus_[static_cast<std::size_t>(element.node[(i + k) % (D + 1)])] += 1.5F;
+    }
+  }
 }
 
 template <int D, class Metric>
@@ -186,21 +193,20 @@ bool Operators<D, Metric>::balance(LocalId e, std::size_t edge) {
   if (ref == no_face || element_of(ref) < e || element.patch[face] != no_patch) return false;
   const std::array<LocalId, 4> around = {element.node[i], element.node[j], element.node[face],
                                          mesh_.element(element_of(ref)).node[local_face(ref)]};
-  int before = 0;
-  int after = 0;
+  float gain = 0;  // of the sum of squares; corners have no ideal
   for (std::size_t k = 0; k < around.size(); ++k) {
-    const int now = surplus(around[k]);
-    const int then = mesh_.vertex(around[k]).dimension == 0 ? 0 : now + (k < 2 ? -1 : 1);
-    before += now * now;
-    after += then * then;
+    if (mesh_.vertex(around[k]).dimension == 0) continue;
+    const float now = surplus_[static_cast<std::size_t>(around[k])];
+    gain += k < 2 ? 2 * now - 1 : -2 * now - 1;
   }
-  if (after >= before) return false;
+  if (gain <= 0) return false;
   cavity_.gather_shell(e, edge);
   cavity_.find_border();
   const StarOf star = star_from(around[2]);
   const Real limit = std::max(0.4 * cavity_.worst_key(), limits.balance_key);
   if (cavity_.evaluate(star, limit) <= limit) return false;
   commit(star);
+  for (std::size_t k = 0; k < around.size(); ++k) surplus_[static_cast<std::size_t>(around[k])] += k < 2 ? -1.0F : 1.0F;
   ++counts.swaps;
   return true;
 }

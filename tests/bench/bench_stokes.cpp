@@ -18,6 +18,7 @@
 #include <map>
 #include <string>
 
+#include "parallel/petsc_session.hpp"
 #include "parallel/session.hpp"
 #include "solvers/newton.hpp"
 #include "solvers/petsc_objects.hpp"
@@ -207,7 +208,8 @@ int main(int argc, char** argv) {
       values[word.substr(0, equals)] = std::stod(word.substr(equals + 1));
     }
   }
-  const malleus::Session session(argc, argv, petsc_options);
+  const malleus::Session session(argc, argv);
+  const malleus::PetscSession petsc("bench_stokes", petsc_options);
   return values.at("m") == 1 ? malleus::run_linear(session.world(), values)
                              : malleus::run_nonlinear(session.world(), values);
 }

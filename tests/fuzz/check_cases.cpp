@@ -20,6 +20,7 @@
 #include "engine/simulator.hpp"
 #include "forge/assemble.hpp"
 #include "inject/assemble.hpp"
+#include "parallel/petsc_session.hpp"
 
 namespace malleus {
 namespace {
@@ -68,5 +69,5 @@ int answer_all(const Communicator& comm, const std::vector<std::string>& argumen
 }  // namespace malleus
 
 int main(int argc, char** argv) {
-  return malleus::run_guarded(argc, argv, malleus::answer_all);
+  return malleus::run_guarded(argc, argv, malleus::answer_all, malleus::start_petsc);
 }

@@ -4,6 +4,7 @@
 
 #include <cfenv>
 
+#include "parallel/petsc_session.hpp"
 #include "parallel/session.hpp"
 #include "support/world.hpp"
 
@@ -18,7 +19,8 @@ const Communicator& world() {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  malleus::Session session(argc, argv, {});
+  malleus::Session session(argc, argv);
+  const malleus::PetscSession petsc("tests", {});
   malleus::test::world_pointer = &session.world();
   feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
   if (!session.world().is_root()) {
