@@ -16,11 +16,13 @@ struct Powers {
   Real returned = 0;     ///< m d / 3
 };
 
+/// Radius of an element's middle in axisymmetric scenes, m: its ring's volume but for 2 pi; else 1.
 Real mean_radius(const Scene& scene, LocalId e) {
   if (scene.geometry != Geometry::axisymmetric) return 1;
+  const auto nodes = scene.mesh.nodes_of_element(e);
   Real sum = 0;
-  for (const LocalId node : scene.mesh.nodes_of_element(e)) sum += scene.mesh.point(node)[0];
-  return std::abs(sum);
+  for (const LocalId node : nodes) sum += scene.mesh.point(node)[0];
+  return std::abs(sum) / static_cast<Real>(nodes.size());
 }
 
 Powers sum_powers(const Scene& scene, Real dt) {

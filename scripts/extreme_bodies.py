@@ -2,14 +2,10 @@
 import re
 
 import numpy as np
-from box_meshes import Boxes, evenly
-from extreme_scenes import CASES, REFUSED, WRONG, ended_well, first_error, refused, row, upsetting, verdict
+from box_msh import BoxMesh
+from extreme_scenes import CASES, ended_well, failure, first_error, row, upsetting, verdict
 
 CONSISTENCY = 1e6
-
-
-def failure(finished):
-    return first_error(finished), REFUSED if refused(finished) else WRONG
 
 
 def body(name, m=0.3):
@@ -32,9 +28,9 @@ def stiff_dies(bench):
 def near_bodies(bench):
     errors = []
     for distance in (1e-6, 0.0, -1e-6):
-        boxes = Boxes()
-        boxes.add("lower", evenly(0, 1, 4), evenly(0, 1, 4))
-        boxes.add("upper", evenly(0, 1, 6), evenly(1 + distance, 2 + distance, 6))
+        boxes = BoxMesh(2)
+        boxes.add("lower", [0, 0], [1, 1], (4, 4))
+        boxes.add("upper", [0, 1 + distance], [1, 2 + distance], (6, 6))
         text = "[mesh]\nfile = near.msh\n[time]\nincrements = 2\nstep = 0.01\n" + body("lower") + body("upper")
         text += "".join(f"[boundary.{name}_x]\ngroup = {name}_x_low\ntype = symmetry\n" for name in ("lower", "upper"))
         text += ("[boundary.top]\ngroup = upper_y_high\nvelocity = free -2\n[boundary.bottom]\ngroup = lower_y_low\nvelocity = free 0\n"
@@ -59,3 +55,27 @@ def cut_offs(bench):
         forces.append(abs(history["force_upper_y_N"][0]))
     changes = np.array(forces[1:]) / forces[0] - 1
     return ", ".join(f"{c:+.1e}" for c in changes), verdict(abs(changes[0]) < 2e-6 and abs(changes[1]) < 6e-5 and abs(changes[2]) < 4e-3)
+
+
+def closed_die(press):
+    """A block with walls 2 % away on one side, in a die that is full after a stroke of 2 %."""
+    text = "[mesh]\nfile = die.msh\n[time]\nend = 0.05\nstep = 0.005\n" + body("billet")
+    text += f"[tool.upper]\nshape = plane\npoint = 0 1\nnormal = 0 -1\nvelocity = 0 -1\n{press}"
+    for name, point, normal in (("lower", "0 0", "0 1"), ("wall", "1.02 0", "-1 0")):
+        text += f"[tool.{name}]\nshape = plane\npoint = {point}\nnormal = {normal}\n"
+    return text + "[boundary.middle]\ngroup = billet_x_low\ntype = symmetry\n"
+
+
+@row("a die full to its corners, under a hydraulic press and under a tool of given speed",
+     "the force stays at its limit within 0.2 %; the tool of given speed is refused")
+def full_die(bench):
+    boxes = BoxMesh(2)
+    boxes.add("billet", [0, 0], [1, 1], (4, 4))
+    mesh, limit = boxes.write(bench.folder / "die.msh"), 40 * CONSISTENCY
+    finished, run = bench.run_text(closed_die(f"press = hydraulic\nforce_limit = {limit}\n"), mesh, "accuracy.two_meshes=no")
+    if not ended_well(finished):
+        return failure(finished)
+    off = run.history["force_upper_y_N"][-3:] / limit - 1
+    finished, _ = bench.run_text(closed_die(""), mesh, "accuracy.two_meshes=no")
+    return f"force {abs(off).max():.1e} off; {first_error(finished)[:80]}", \
+        verdict(abs(off).max() < 2e-3 and finished.returncode == 3 and "die is full" in finished.stderr)

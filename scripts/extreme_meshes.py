@@ -1,15 +1,11 @@
 """Rows of scripts/extremes: soft pockets, flattened and graded elements, slivers of a CAD part, ends of fillings, ranks without elements."""
 import numpy as np
-from box_meshes import Boxes, evenly
-from extreme_scenes import REFUSED, WRONG, ended_well, first_error, refused, row, verdict
+from box_msh import BoxMesh, evenly
+from extreme_scenes import WRONG, ended_well, failure, row, verdict
 
 CHANNEL = ("[mesh]\nfile = channel.msh\n[time]\nincrements = 0\n[fluid.melt]\nlaw = newtonian\nviscosity = 1000\n[initial]\nfluid = melt\n"
            "[inlet.gate]\ngroup = cavity_x_low\nfluid = melt\nflow_rate = 1\n[vent.out]\ngroup = cavity_x_high\n"
            "[wall.low]\ngroup = cavity_y_low\n[wall.high]\ngroup = cavity_y_high\n")
-
-
-def failure(finished):
-    return first_error(finished), REFUSED if refused(finished) else WRONG
 
 
 @row("30 soft pockets in a fluid, 1e4 and 1e8 times as soft", "converges to the true residual, none of the fallbacks")
@@ -28,8 +24,8 @@ def pockets(bench):
 
 
 def channel_pressure(bench, xs, ys):
-    boxes = Boxes()
-    boxes.add("cavity", xs, ys)
+    boxes = BoxMesh(2)
+    boxes.add_lines("cavity", [xs, ys])
     finished, run = bench.run_text(CHANNEL, boxes.write(bench.folder / "channel.msh"), "accuracy.two_meshes=no")
     if not ended_well(finished):
         return finished, None, 0

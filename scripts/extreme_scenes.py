@@ -95,6 +95,11 @@ def first_error(finished):
     return re.sub(r"/\S*/", "", line).removeprefix("error: ")[:140]
 
 
+def failure(finished):
+    """(seen, verdict) of a run that did not end well."""
+    return first_error(finished), REFUSED if refused(finished) else WRONG
+
+
 def closed_form():
     spec = importlib.util.spec_from_file_location("upsetting", CASES / "upsetting" / "table.py")
     table = importlib.util.module_from_spec(spec)
@@ -133,7 +138,7 @@ def rate_sensitivities(bench):
 def lowest_rate_sensitivity(bench):
     finished, history, error = upsetting(bench, "time.increments=2", m=0.01)
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     return f"{int(history['newton_iterations'][0])} iterations, force {error:+.1e}", verdict(abs(error) < 1e-2)
 
 
@@ -141,7 +146,7 @@ def lowest_rate_sensitivity(bench):
 def gap(bench):
     finished, history, _ = upsetting(bench, "tool.upper.point=0 21 mm", "time.stroke=3 mm")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     table, force = closed_form(), np.abs(history["force_upper_y_N"])
     height = table.HEIGHT - np.maximum(history["stroke_upper_m"] - table.SPEED * history["dt_s"] - 1e-3, 0)
     pressed = np.nonzero(force > 0)[0]
@@ -180,7 +185,7 @@ def penalty(bench):
 def long_steps(bench):
     finished, history, _ = upsetting(bench, "time.step=100 ms")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     table = closed_form()
     height = table.HEIGHT - table.SPEED * (history["time_s"][-1] - history["dt_s"][-1])
     error = abs(history["force_upper_y_N"][-1]) / table.force({"case": "axisymmetric.ini"}, history["volume_m3"][0], height) - 1
@@ -240,7 +245,7 @@ def sliver(bench):
     path.write_text("\n".join(flattened(lines, 3, 1e-4)) + "\n")
     finished, run = bench.run("upsetting/case.ini", path, "time.increments=3", "accuracy.two_meshes=no")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     table, history = closed_form(), run.history
     error = abs(history["force_upper_z_N"][0]) / table.force({"case": "case.ini"}, history["volume_m3"][0], table.HEIGHT) - 1
     return f"force {error:+.1e}, {int(history['newton_iterations'][0])} Newton iterations", verdict(abs(error) < 0.01)
@@ -302,14 +307,14 @@ def front_steps(bench):
 @row("front CFL 50", "refused, or sub-cycled")
 def impossible_step(bench):
     finished, _, _ = filling(bench, "front.cfl=50")
-    return first_error(finished), REFUSED if refused(finished) else WRONG
+    return failure(finished)
 
 
 @row("steps of 50 elements asked for (flow kept for 50 elements)", "the front goes in sub-steps: volume exact, pressure bounded")
 def long_flow(bench):
     finished, run, _ = filling(bench, "flow.update_distance=50")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     volume = abs(run.summary["accuracy"]["volume_error"])
     pressure = np.max(np.abs(run.history["pressure_gate_Pa"]))
     return f"volume {volume:.0e}, freezing error {run.summary['accuracy']['flow_freezing_error_elements']:.2g} elements told", \
@@ -321,7 +326,7 @@ def shear_thinning(bench):
     finished, run = bench.run("channel/power-law.ini", bench.mesh("channel", "--across", "8"), "fluid.polymer.exponent=0.1",
                               "accuracy.two_meshes=no")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     fall = run.probe("first")["pressure"][-1] - run.probe("second")["pressure"][-1]
     error = fall / 0.02 / (2 * 1000 / 0.004 * (2 * 1.2 / 0.1 * 0.02 / 0.004) ** 0.1) - 1
     return f"pressure gradient {error:+.1%}", verdict(abs(error) < 0.05)
@@ -331,7 +336,7 @@ def shear_thinning(bench):
 def densities(bench):
     rows = [filling(bench, *settings, end="time.end=0.6 s") for settings in ((), ("fluid.polymer.density=1000 kg/m^3", "fluid.air.density=1 kg/m^3"))]
     if not all(ended_well(finished) for finished, _, _ in rows):
-        return first_error(rows[1][0]), REFUSED if refused(rows[1][0]) else WRONG
+        return failure(rows[1][0])
     same = all(np.array_equal(rows[0][1].history[name], rows[1][1].history[name]) for name in ("pressure_gate_Pa", "fill_fraction"))
     return "equal to the last digit" if same else "different", verdict(same)
 
@@ -356,7 +361,7 @@ def more_ranks_than_sense(bench):
     for ranks in (1, 16):
         finished, run = bench.run("channel/steady.ini", bench.mesh("channel", "--across", "2"), "accuracy.two_meshes=no", ranks=ranks)
         if not ended_well(finished):
-            return first_error(finished), REFUSED if refused(finished) else WRONG
+            return failure(finished)
         values.append(run.summary["final"]["pressure_gate_Pa"])
     return f"differ by {abs(values[1] / values[0] - 1):.1e}", verdict(abs(values[1] / values[0] - 1) < 1e-5)
 
@@ -366,6 +371,6 @@ def contrast(bench):
     finished, run = bench.run("manufactured/variable.ini", bench.mesh("manufactured", "--dimension", "2", "--across", "16"),
                               "fluid.test.viscosity=\"exp(18.42*x)\"", "accuracy.two_meshes=no")
     if not ended_well(finished):
-        return first_error(finished), REFUSED if refused(finished) else WRONG
+        return failure(finished)
     linear = run.summary["linear"]
     return f"{linear['iterations']} iterations in {linear['solves']} solves", verdict(linear["failures"] == 0 and linear["iterations"] < 200)

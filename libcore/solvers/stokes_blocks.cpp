@@ -5,7 +5,6 @@
 
 #include "base/index.hpp"
 #include "solvers/petsc_objects.hpp"
-#include "solvers/viscosity_range.hpp"
 
 namespace malleus {
 namespace {
@@ -136,12 +135,10 @@ BlockValues<T> read_matrix(const LinearSystem& system, StokesBlocks& blocks) {
 
 }  // namespace
 
-StokesBlocks extract_blocks(const LinearSystem& system) {
-  // While entries are made for this alone, both copies of them are the peak of the memory. Single precision holds them
-  // where the cycle needs no more.
-  constexpr Real narrow_contrast = 1e6;
+StokesBlocks extract_blocks(const LinearSystem& system, CyclePrecision precision) {
   StokesBlocks blocks;
-  if (system.entries != nullptr && viscosity_range(system).contrast() <= narrow_contrast) {
+  // While entries are made for this alone, both copies of them are the peak of the memory.
+  if (system.entries != nullptr && precision == CyclePrecision::single_precision) {
     const BlockValues<float> narrow = read_matrix<float>(system, blocks);
     blocks.velocity.rows = narrow.rows;
     blocks.velocity.columns = narrow.columns;

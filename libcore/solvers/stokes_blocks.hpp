@@ -4,6 +4,7 @@
 
 #include "fem/linear_system.hpp"
 #include "solvers/multigrid/block_rows.hpp"
+#include "solvers/preconditioner_settings.hpp"
 
 namespace malleus {
 
@@ -17,7 +18,8 @@ struct StokesBlocks {
   Real scaling = 1;             ///< a power of two that brings the largest diagonal entry near 1
 };
 
-/// Reads the matrix of the system (BAIJ, sequential or distributed). Collective.
-StokesBlocks extract_blocks(const LinearSystem& system);
+/// Reads the matrix of the system (BAIJ, sequential or distributed). Entries that are made for this alone are rounded
+/// to single precision where that of the cycle is. Collective.
+StokesBlocks extract_blocks(const LinearSystem& system, CyclePrecision precision = CyclePrecision::double_precision);
 
 }  // namespace malleus

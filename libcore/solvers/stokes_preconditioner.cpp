@@ -53,7 +53,7 @@ PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSyst
 }
 
 StokesPreconditioner::StokesPreconditioner(const BorderedOperator& op, const PreconditionerSettings& settings)
-    : settings_(settings), operator_(&op), blocks_(extract_blocks(op.system())) {
+    : settings_(settings), operator_(&op), blocks_(extract_blocks(op.system(), settings.precision)) {
   const LinearSystem& system = op.system();
   pressure_ = std::make_unique<PressureBlock>(system, blocks_, settings_.chebyshev_steps);
   lubrication_ = LubricationBlock::make_where_thin(op, blocks_);

@@ -22,7 +22,7 @@ PreconditionerSettings resolve(PreconditionerSettings settings, const LinearSyst
 /// cycle, S = M(1/eta)/2 + C by Chebyshev steps, E = d - g^T A^-1 g; e_k is 1 on the nodes of closed soft pocket k (or
 /// a part of one), E_k = 1.5 (V_k/eta + the same of the elements around it) + e_k^T C e_k. Where walls make long thin
 /// sections, (z_p, z_q) also has the part of LubricationBlock. With the exact blocks a Krylov method would need a few
-/// iterations; it needs 25-30 with these, at any mesh size. Holds no reference to the system it was made from.
+/// iterations; it needs 16 to 19 with these, up to 900,000 nodes. Holds no reference to the system it was made from.
 class StokesPreconditioner {
  public:
   /// settings: resolved. Collective.

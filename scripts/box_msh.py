@@ -1,5 +1,9 @@
-"""Boxes of triangles or tetrahedra as MSH 2.2 files, for tests of the executables."""
+"""Boxes of triangles or tetrahedra as MSH 2.2 files, for scenes and tests that need no mesher."""
 import itertools
+
+
+def evenly(low, high, cells):
+    return [low + (high - low) * k / cells for k in range(cells + 1)]
 
 
 class BoxMesh:
@@ -18,13 +22,17 @@ class BoxMesh:
         return self.names.index((dim, name)) + 1
 
     def add(self, name, low, high, cells):
-        """cells: along each axis. Kuhn's division, so that neighbours conform."""
+        """cells: along each axis, all of one size."""
+        self.add_lines(name, [evenly(*axis) for axis in zip(low, high, cells)])
+
+    def add_lines(self, name, lines):
+        """Cells between these coordinates along each axis. Kuhn's division, so that neighbours conform."""
         dim, first = self.dim, len(self.points)
-        counts = [n + 1 for n in cells]
+        cells = [len(axis) - 1 for axis in lines]
         number = {}
-        for index in itertools.product(*(range(n) for n in counts)):
+        for index in itertools.product(*(range(n + 1) for n in cells)):
             number[index] = first + len(number) + 1
-            self.points.append([low[a] + (high[a] - low[a]) * index[a] / cells[a] for a in range(dim)])
+            self.points.append([axis[i] for axis, i in zip(lines, index)])
         volume = self.group(dim, name)
         for corner in itertools.product(*(range(n) for n in cells)):
             for axes in itertools.permutations(range(dim)):
@@ -51,3 +59,4 @@ class BoxMesh:
         lines += ["$EndElements", ""]
         with open(path, "w") as file:
             file.write("\n".join(lines))
+        return path
