@@ -3,14 +3,41 @@ import json
 import pathlib
 import os
 import shutil
+import signal
 import tempfile
+import time
 import unittest
 
 import mini_slurm
-from long_runs import check_sound, digits, finish, start, write_case
+from long_runs import check_sound, digits, finish, rows_so_far, start, write_case
+from runs import PATIENCE
 
 SOURCE = pathlib.Path(os.environ["MALLEUS_SOURCE"])
 SCRIPTS = SOURCE / "scripts" / "slurm"
+
+
+def runs_in(process, program, directory):
+    """Whether the process of a folder of /proc runs the program in the directory."""
+    try:
+        return (pathlib.Path(os.readlink(process / "exe")).name == program
+                and pathlib.Path(os.readlink(process / "cwd")).samefile(directory))
+    except OSError:
+        return False  # it ended meanwhile
+
+
+def has_pending(process, number):
+    """Whether a signal waits for the process to go on."""
+    status = (pathlib.Path("/proc") / str(process) / "status").read_text()
+    masks = [int(line.split()[1], 16) for line in status.splitlines() if line.startswith(("SigPnd", "ShdPnd"))]
+    return any(mask >> (number - 1) & 1 for mask in masks)
+
+
+def wait_until(condition, what, seconds):
+    limit = time.monotonic() + seconds * PATIENCE
+    while not condition():
+        if time.monotonic() > limit:
+            raise AssertionError(f"{what}: did not come within {seconds} s")
+        time.sleep(0.02)
 
 
 class Usage(unittest.TestCase):
@@ -43,20 +70,33 @@ class Jobs(unittest.TestCase):
         return "".join(path.read_text() for path in sorted(pathlib.Path(self.scratch).glob("slurm-*.out")))
 
     def test_limit_checkpoint_requeue_done(self):
-        case = write_case("forge", self.scratch, 5000)  # some 50 s: the scheduler looks at limits every 30 s
+        case = write_case("forge", self.scratch, 200)
         whole = pathlib.Path(self.scratch) / "whole"
         code, said = finish(start("forge", case, whole, ranks=2), 400)
         self.assertEqual(code, 0, said)
-        # The signal is due when the job begins: it comes with the scheduler's next look, within seconds.
-        slow = "-D", "output.every=1"
-        job = self.submit("--ntasks=2", "--time=1", "--signal=B:USR1@55", SCRIPTS / "job.sh", "forge", case, "-o", "out",
-                          *slow)
-        self.assertEqual(self.slurm.wait_to_end(job, 400), "COMPLETED", self.logs())
+        # The signal is due when the job begins, and comes with the scheduler's next look: at most half a minute later.
+        # The first leg is held that long, however fast this machine is.
         output = pathlib.Path(self.scratch) / "out"
+        job = self.submit("--ntasks=2", "--time=10", "--signal=B:USR1@595", SCRIPTS / "job.sh", "forge", case, "-o", "out",
+                          "-D", "output.every=1")
+        ranks = self.hold_ranks(output)
+        wait_until(lambda: any(has_pending(rank, signal.SIGUSR1) for rank in ranks), "the signal before the limit", 200)
+        for rank in ranks:
+            os.kill(rank, signal.SIGCONT)
+        self.assertEqual(self.slurm.wait_to_end(job, 400), "COMPLETED", self.logs())
         self.assertIn("leg 1 stopped before the time limit; back to the queue", self.logs())
         self.assertEqual(json.loads((output / "summary.json").read_text())["status"], "done")
         check_sound(output, "forge", every=1)
         self.assertEqual(digits(output), digits(whole))
+
+    def hold_ranks(self, output):
+        """Stops both ranks of the running job after some increments; their process ids."""
+        wait_until(lambda: rows_so_far(output) >= 20, "twenty increments", 200)
+        ranks = [int(entry.name) for entry in pathlib.Path("/proc").glob("[0-9]*") if runs_in(entry, "forge", self.scratch)]
+        self.assertEqual(len(ranks), 2)
+        for rank in ranks:
+            os.kill(rank, signal.SIGSTOP)
+        return ranks
 
     def test_arrays(self):
         case = write_case("inject", self.scratch, 6)
