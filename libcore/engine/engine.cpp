@@ -212,6 +212,7 @@ void Engine::restore(SavedState&& saved) {
   last_output_ = state.at("last_output");
   space_estimate_.restore(state.at("space_estimate"));
   is_estimated_halfway_ = state.at("is_estimated_halfway");
+  run_forecast_.restore(state.at("forecast"));
   if (Probes* probes = process_.probes()) probes->set_places(state.at("probes").get<std::vector<std::vector<Real>>>());
   process_.restore(std::move(saved.mesh), std::move(saved.fields), saved.state.at("process"));
   if (!saved.is_dealt_anew) process_.restore_local(saved.local);
@@ -306,6 +307,7 @@ std::optional<std::string> Engine::make_increment() {
       last_ = increment;
       if (is_compared) timed("estimate", [&] { space_estimate_.compare(process_, increment); });
       record(increment);
+      foresee();
       return std::nullopt;
     }
     if (outcome.kind == Outcome::Kind::failed || cut == most_cuts) return outcome.why;
@@ -339,19 +341,24 @@ void Engine::record(const Increment& increment) {
   if (increment.number % settings_.output_every == 0) write_fields(increment.number);
 }
 
-/// Share of the run that is done, 0..1, as far as it can be told.
-Real Engine::progress() const {
-  const Real done = std::isfinite(settings_.end) ? last_.time / settings_.end : 0;
+Stand Engine::stand() const {
+  const Real by_time = std::isfinite(settings_.end) ? last_.time / settings_.end : 0;
   const Real by_count =
       settings_.increments ? Real(last_.number) / Real(std::max<GlobalId>(*settings_.increments, 1)) : 0;
-  return std::clamp(std::max({done, by_count, process_.progress()}), 0.0, 1.0);
+  return {last_.number, wall_s(), {by_time, by_count, process_.progress()}};
+}
+
+/// Share of the run that is done, 0..1, as far as it can be told.
+Real Engine::progress() const {
+  const std::array<Real, 3> parts = stand().progress;
+  return std::clamp(*std::ranges::max_element(parts), 0.0, 1.0);
 }
 
 void Engine::print_increment(const Increment& increment) {
-  const Real share = progress();
-  const std::string eta = share > 0 ? report::duration(wall_s() * (1 - share) / share) : "-";
+  const auto rest = run_forecast_.rest(stand());
   log::info("{:6} | t {:.5g} s | dt {:.3g} s | {} | {:.1f} s | {:.0f} % | left {}", increment.number, increment.time,
-            increment.dt, process_.increment_note(), wall_s(), 100 * share, eta);
+            increment.dt, process_.increment_note(), wall_s(), 100 * progress(),
+            rest ? report::duration(rest->wall_s) : "-");
 }
 
 void Engine::write_fields(GlobalId increment) {
@@ -391,7 +398,8 @@ void Engine::write_checkpoint() {
                        {"longest_checkpoint_s", longest_checkpoint_s_},
                        {"last_output", last_output_},
                        {"space_estimate", space_estimate_.save()},
-                       {"is_estimated_halfway", is_estimated_halfway_}};
+                       {"is_estimated_halfway", is_estimated_halfway_},
+                       {"forecast", run_forecast_.save()}};
     if (const Probes* probes = process_.probes()) state["engine"]["probes"] = probes->places();
     state["process"] = process_.save_state();
     checkpoints_.write(last_.number, process_.mesh(), process_.fields(), state, process_.save_local());
@@ -448,18 +456,37 @@ void Engine::finish(const std::string& status, int code) {
   print_checkpoint_cost();
   for (const std::string& line : process_.closing_lines()) log::info("{}", line);
   for (const std::string& line : budget.lines()) log::info("{}", line);
-  const Forecast forecast = process_.forecast();
-  if (code == exit_code::done && last_.number > 0) {
-    log::info("took {} increments, {:.1f} s and {:.0f} MiB; the forecast was {}, {:.1f} s and {:.0f} MiB", last_.number,
-              wall_s(), static_cast<Real>(comm_.sum(peak_memory_bytes())) / 1048576, forecast.increments,
-              forecast.wall_s, forecast.memory_bytes / 1048576);
-  }
+  if (code == exit_code::done && last_.number > 0) print_taken();
   log::info("{} ({}): results in {}", status, end_reason_.empty() ? "solved" : end_reason_,
             settings_.directory.string());
   if (code == exit_code::numerics && comm_.is_root()) {
     fmt::print(stderr, "error: {}\nThe last good state is that of increment {}, in {}\n", end_reason_, last_.number,
                (settings_.directory / (settings_.case_name + ".xdmf")).string());
   }
+}
+
+/// What the rest of the run will take, said once, as soon as its first increments tell.
+void Engine::foresee() {
+  const bool is_estimate_left = space_estimate_.is_asked_for() && process_.solves_again() && !is_estimated_halfway_;
+  const Real estimate_s = is_estimate_left ? timing("estimate").wall_s : 0;
+  if (!run_forecast_.see(comm_, stand(), estimate_s)) return;
+  const Forecast& forecast = *run_forecast_.made();
+  log::info("forecast from the increments so far: {} increments, {} wall time, {:.0f} MiB over all ranks",
+            forecast.increments, report::duration(forecast.wall_s), forecast.memory_bytes / 1048576);
+}
+
+/// The run's own forecast and the increments it was made after; where it made none, that of the plan and 0.
+std::pair<Forecast, GlobalId> Engine::best_forecast() const {
+  if (const auto& made = run_forecast_.made()) return {*made, run_forecast_.made_after()};
+  return {process_.forecast(), 0};
+}
+
+void Engine::print_taken() const {
+  const auto [forecast, after] = best_forecast();
+  const std::string when = after > 0 ? fmt::format("after increment {}", after) : "before the run";
+  log::info("took {} increments, {:.1f} s and {:.0f} MiB; the forecast {} was {}, {:.1f} s and {:.0f} MiB",
+            last_.number, wall_s(), static_cast<Real>(comm_.sum(peak_memory_bytes())) / 1048576, when,
+            forecast.increments, forecast.wall_s, forecast.memory_bytes / 1048576);
 }
 
 void Engine::print_timings() {
@@ -488,14 +515,9 @@ void Engine::write_summary(const std::string& status, int code, const ErrorBudge
   summary["reason"] = end_reason_;
   summary["increments"] = last_.number;
   summary["wall_s"] = wall_s();
-  const Forecast forecast = process_.forecast();
-  const auto ratio = [](Real taken, Real expected) {
-    return expected > 0 ? nlohmann::json(taken / expected) : nullptr;
-  };
-  summary["forecast"]["taken_over_expected"] = {
-      {"increments", ratio(static_cast<Real>(last_.number), static_cast<Real>(forecast.increments))},
-      {"wall_s", ratio(wall_s(), forecast.wall_s)},
-      {"memory_bytes", ratio(summary["peak_memory_bytes"], forecast.memory_bytes)}};
+  const auto [forecast, after] = best_forecast();
+  summary["forecast"] =
+      report::forecast_json(forecast, after, {wall_s(), summary["peak_memory_bytes"].get<Real>(), last_.number});
   nlohmann::json final_row = nlohmann::json::object();
   for (std::size_t i = 0; i < history_->last_row().size(); ++i) {
     const HistoryCell& cell = history_->last_row()[i];

@@ -6,10 +6,12 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/history.hpp"
 #include "engine/process.hpp"
+#include "engine/run_forecast.hpp"
 #include "engine/space_estimate.hpp"
 #include "engine/stop_request.hpp"
 #include "parallel/communicator.hpp"
@@ -69,6 +71,7 @@ class Engine {
   Increment next_increment();
   std::optional<std::string> make_increment();
   bool begin_estimate();
+  Stand stand() const;
   Real progress() const;
   ErrorBudget error_budget();
   void record(const Increment& increment);
@@ -83,6 +86,9 @@ class Engine {
   void write_summary(const std::string& status, int code, const ErrorBudget& budget);
   void print_timings();
   void print_checkpoint_cost();
+  void foresee();
+  std::pair<Forecast, GlobalId> best_forecast() const;
+  void print_taken() const;
   Timing& timing(const std::string& name);
   template <class Work>
   auto timed(const std::string& name, Work work);
@@ -96,6 +102,7 @@ class Engine {
   CheckpointStore checkpoints_;
   SpaceEstimate space_estimate_;
   bool is_estimated_halfway_ = false;
+  RunForecast run_forecast_;
   std::optional<History> history_;
   std::vector<Timing> timings_;
   Increment last_;                                              ///< the last increment done

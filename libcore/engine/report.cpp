@@ -93,11 +93,22 @@ nlohmann::json summary(const Communicator& comm, Process& process, const RunSett
                        {"solve_s", comm.max(linear.solve_s)}};
   summary["accuracy"] = process.accuracy();
   summary["accuracy"]["level"] = settings.level;
-  const Forecast forecast = process.forecast();
-  summary["forecast"] = {
-      {"wall_s", forecast.wall_s}, {"memory_bytes", forecast.memory_bytes}, {"increments", forecast.increments}};
   summary["warnings"] = log::warnings();
   return summary;
+}
+
+nlohmann::json forecast_json(const Forecast& forecast, GlobalId after_increment, const Forecast& taken) {
+  const auto ratio = [](Real taken_value, Real expected) {
+    return expected > 0 ? nlohmann::json(taken_value / expected) : nullptr;
+  };
+  return {{"after_increment", after_increment},
+          {"wall_s", forecast.wall_s},
+          {"memory_bytes", forecast.memory_bytes},
+          {"increments", forecast.increments},
+          {"taken_over_expected",
+           {{"increments", ratio(static_cast<Real>(taken.increments), static_cast<Real>(forecast.increments))},
+            {"wall_s", ratio(taken.wall_s, forecast.wall_s)},
+            {"memory_bytes", ratio(taken.memory_bytes, forecast.memory_bytes)}}}};
 }
 
 }  // namespace malleus::report

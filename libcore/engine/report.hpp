@@ -26,5 +26,8 @@ void print_timings(const Communicator& comm, const std::vector<ComponentTime>& r
 /// What summary.json says of the run as a whole, without status and final row. Collective.
 nlohmann::json summary(const Communicator& comm, Process& process, const RunSettings& settings,
                        const std::vector<ComponentTime>& rows);
+/// `forecast` of summary.json: what was expected after an increment (0: before the run), and what was taken over it.
+/// Local.
+nlohmann::json forecast_json(const Forecast& forecast, GlobalId after_increment, const Forecast& taken);
 
 }  // namespace malleus::report
