@@ -20,6 +20,9 @@ namespace {
 constexpr Real dissipation_guard = 0.2;
 /// Steps are planned at the speed before them: the share of the distance that counts as all of it.
 constexpr Real nearly = 0.75;
+/// Share of switch_fill that rounding may take away: an increment that ends at it has reached it, on any number of
+/// ranks.
+constexpr Real rounding = 1e-9;
 
 FieldSpec velocity_spec(int dim) {
   return {"velocity", "m/s", Support::node, dim, Transfer::interpolate, false};
@@ -154,7 +157,8 @@ std::vector<GateDrive> Flow::present_drives(Real time) {
   std::vector<GateDrive> drives = asked_drives(scene_, time);
   for (std::size_t i = 0; i < drives.size(); ++i) {
     const InletSettings& inlet = scene_.settings.inlets[i];
-    if (!state_.gates[i].switched && inlet.switch_fill && state_.filled >= *inlet.switch_fill * scene_.cavity) {
+    const Real switch_volume = inlet.switch_fill.value_or(0) * (1 - rounding) * scene_.cavity;
+    if (!state_.gates[i].switched && inlet.switch_fill && state_.filled >= switch_volume) {
       state_.gates[i].switched = true;
       log::info("inlet {} switches over to {:.4g} Pa at a fill of {:.4g}", inlet.name, *inlet.then_pressure,
                 state_.filled / scene_.cavity);
