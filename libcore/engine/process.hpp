@@ -51,7 +51,7 @@ class Process {
   virtual FieldStore& fields() = 0;
   virtual std::vector<Component*> components() = 0;
   virtual std::vector<LeftOut> left_out() const = 0;
-  /// Models that the scene might do without, and what to write instead: lines of the plan. Local, same on all ranks.
+  /// Models that the scene might do without, and what to write instead: lines of the plan.
   virtual std::vector<std::string> suggestions() const { return {}; }
   virtual std::vector<std::string> accuracy_settings()
       const = 0;  ///< lines of the plan: "newton_tolerance 1e-4 (level standard)"

@@ -2,13 +2,9 @@
 
 /// Signed distances of simple shapes: positive inside, negative outside [m].
 
-#include <array>
-
-#include "base/types.hpp"
+#include "base/position.hpp"
 
 namespace malleus {
-
-using Position = std::array<Real, 3>;  ///< x, y, z; z = 0 in 2D
 
 struct Sphere {
   Position center = {0, 0, 0};

@@ -135,6 +135,15 @@ class Inject(What):
             plan = run("inject", self.directory / "case.ini", self.directory / "plan", "--check").stdout
             self.assertEqual("no [inertia]" in plan, is_named, plan)
 
+    def test_a_check_names_thin_air_halves_and_flows_that_stay(self):
+        start = "[time]\nend = 1\n[initial]\nfluid = air\n[initial.start]\nfluid = melt\nlevel_set = \"1 - x\"\n" + self.MELT + self.ENDS
+        half, void, once = "mirror image about y = 0.5 m", "[fluid.air] law = void", "[flow] update = once"
+        slips = start.replace("group = cavity_y_high\n", "group = cavity_y_high\ncondition = slip\n")
+        for text, viscosity, named in ((start, 1e-4, {half, void}), (start, 1, {half, once}), (slips, 0.1, set())):
+            (self.directory / "case.ini").write_text(f"[mesh]\nfile = box.msh\n{text}[fluid.air]\nlaw = newtonian\nviscosity = {viscosity}\n")
+            plan = run("inject", self.directory / "case.ini", self.directory / "plan", "--check").stdout
+            self.assertEqual({line for line in (half, void, once) if line in plan}, named, plan)
+
     def test_a_prescribed_flow_solves_no_equations(self):
         air = "[fluid.air]\nlaw = newtonian\nviscosity = 1e-3\n[initial]\nfluid = air\n"
         start = "[initial.start]\nfluid = melt\nlevel_set = \"1 - x\"\n"
