@@ -227,10 +227,12 @@ def mutant(program, seed, number):
     return how(CASES[program], dice), how is spoil
 
 
-def run(command, directory):
-    """Exit code, what was said on standard error, and processor seconds; a signal's negative number as the exit code."""
+def run(command, directory, sessions):
+    """Exit code, what was said on standard error, and processor seconds; a signal's negative number as the exit code. Open MPI's
+    files go to a directory of their own: runs at a time take one another's away."""
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said, cwd=directory)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said, cwd=directory,
+                                   env={**os.environ, "OMPI_MCA_orte_tmpdir_base": str(sessions)})
         alarm = threading.Timer(PATIENCE, process.kill)
         alarm.start()
         _, status, usage = os.wait4(process.pid, 0)
@@ -256,14 +258,18 @@ class Checker:
     """Runs --check on case texts in a directory of its own."""
 
     def __init__(self, directory, mesh):
-        self.directory = pathlib.Path(directory)
+        self.directory = pathlib.Path(directory) / "case"
+        self.sessions = pathlib.Path(directory) / "sessions"
+        for path in (self.directory, self.sessions):
+            path.mkdir(exist_ok=True)
         (self.directory / "square.msh").write_text(mesh)
 
     def judge(self, program, text, is_wrong, answers, ranks=1):
         """What is wrong with the program's answer to the text; None where nothing is."""
         case = self.directory / "case.ini"
         case.write_bytes(text.encode("latin-1"))
-        code, said, seconds = run(([*LAUNCH, str(ranks)] if ranks > 1 else []) + [BIN / program, "--check", case], self.directory)
+        code, said, seconds = run(([*LAUNCH, str(ranks)] if ranks > 1 else []) + [BIN / program, "--check", case],
+                                  self.directory, self.sessions)
         answers.add(code, seconds)
         if code not in (0, 2) or (is_wrong and code != 2):
             return f"{program} ended with {code} on {ranks} ranks:\n{said}\n{text}"

@@ -31,7 +31,7 @@ struct Column {
 template <class T, int B>
 struct Sum {
   using K = Column<T, B>;
-  static constexpr int parts = B < 3 ? B : 3;
+  static constexpr int parts = std::min(B, 3);
   std::array<typename K::Register, parts> part;
 
   explicit Sum(const typename K::Register& first) {
