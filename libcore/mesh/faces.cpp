@@ -1,9 +1,7 @@
 #include "mesh/faces.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
-#include <tuple>
 
 #include "base/error.hpp"
 
@@ -12,32 +10,36 @@ namespace {
 
 /// A face filed under its smallest node, by its other nodes in increasing order.
 struct FiledFace {
-  LocalId second = -1;
-  LocalId third = -1;
+  std::uint64_t others = 0;
   LocalId element = -1;
   std::int32_t face = 0;
 };
 
-std::array<LocalId, 3> sorted_face(int dim, const LocalId* nodes, int face) {
-  constexpr LocalId last = std::numeric_limits<LocalId>::max();
-  std::array<LocalId, 3> sorted = {nodes[face_node(dim, face, 0)], nodes[face_node(dim, face, 1)], last};
-  if (dim == 3) sorted[2] = nodes[face_node(dim, face, 2)];
-  std::sort(sorted.begin(), sorted.end());
-  return sorted;
-}
+struct SortedFace {
+  LocalId smallest;
+  std::uint64_t others;  ///< the second in the upper half; in 2D nothing in the lower
+};
 
-bool same_face(const FiledFace& a, const FiledFace& b) {
-  return a.second == b.second && a.third == b.third;
+SortedFace sorted_face(int dim, const LocalId* nodes, int face) {
+  const LocalId a = nodes[face_node(dim, face, 0)];
+  const LocalId b = nodes[face_node(dim, face, 1)];
+  const LocalId low = std::min(a, b);
+  const LocalId high = std::max(a, b);
+  if (dim == 2) return {low, static_cast<std::uint64_t>(high) << 32};
+  const LocalId c = nodes[face_node(dim, face, 2)];
+  const LocalId second = std::max(low, std::min(high, c));
+  const LocalId third = std::max(high, c);
+  return {std::min(low, c), static_cast<std::uint64_t>(second) << 32 | static_cast<std::uint64_t>(third)};
 }
 
 /// Pairs equal faces of one file (all faces with the same smallest node).
 void match_file(std::span<FiledFace> file, int per_element, std::vector<LocalId>& neighbours) {
   std::sort(file.begin(), file.end(), [](const FiledFace& a, const FiledFace& b) {
-    return std::tie(a.second, a.third, a.element) < std::tie(b.second, b.third, b.element);
+    return a.others != b.others ? a.others < b.others : a.element < b.element;
   });
   for (std::size_t i = 0; i + 1 < file.size(); ++i) {
-    if (!same_face(file[i], file[i + 1])) continue;
-    if (i + 2 < file.size() && same_face(file[i], file[i + 2])) {
+    if (file[i].others != file[i + 1].others) continue;
+    if (i + 2 < file.size() && file[i].others == file[i + 2].others) {
       throw InputError("the mesh is not manifold: a face belongs to more than two elements");
     }
     const FiledFace& a = file[i];
@@ -60,13 +62,14 @@ std::vector<LocalId> element_neighbours(int dim, LocalId nodes, std::span<const 
       for (int f = 0; f < per_element; ++f) visit(e, f, sorted_face(dim, vertices, f));
     }
   };
-  for_each_face([&](LocalId, int, const auto& face) { ++file_begin[static_cast<std::size_t>(face[0]) + 1]; });
+  for_each_face(
+      [&](LocalId, int, const SortedFace& face) { ++file_begin[static_cast<std::size_t>(face.smallest) + 1]; });
   std::partial_sum(file_begin.begin(), file_begin.end(), file_begin.begin());
 
   std::vector<FiledFace> filed(static_cast<std::size_t>(file_begin.back()));
   std::vector<std::int64_t> next(file_begin.begin(), file_begin.end() - 1);
-  for_each_face([&](LocalId e, int f, const auto& face) {
-    filed[static_cast<std::size_t>(next[static_cast<std::size_t>(face[0])]++)] = {face[1], face[2], e, f};
+  for_each_face([&](LocalId e, int f, const SortedFace& face) {
+    filed[static_cast<std::size_t>(next[static_cast<std::size_t>(face.smallest)]++)] = {face.others, e, f};
   });
 
   std::vector<LocalId> neighbours(element_nodes.size(), -1);

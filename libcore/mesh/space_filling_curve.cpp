@@ -5,27 +5,43 @@
 namespace malleus {
 namespace {
 
-/// Skilling's in-place transform from axis coordinates to the transposed Hilbert index.
+/// All bits set where the bit of x is.
+std::uint32_t mask_of(std::uint32_t x, int bit) {
+  return -((x >> bit) & 1U);
+}
+
+/// Skilling's in-place transform from axis coordinates to the transposed Hilbert index (2004), without branches: the
+/// bits are random.
 void axes_to_transpose(std::uint32_t* x, int bits, int dim) {
-  const std::uint32_t top = std::uint32_t{1} << (bits - 1);
-  for (std::uint32_t q = top; q > 1; q >>= 1) {
-    const std::uint32_t lower = q - 1;
+  for (int bit = bits - 1; bit > 0; --bit) {
+    const std::uint32_t lower = (std::uint32_t{1} << bit) - 1;
     for (int i = 0; i < dim; ++i) {
-      if ((x[i] & q) != 0) {
-        x[0] ^= lower;
-      } else {
-        const std::uint32_t swapped = (x[0] ^ x[i]) & lower;
-        x[0] ^= swapped;
-        x[i] ^= swapped;
-      }
+      const std::uint32_t is_set = mask_of(x[i], bit);
+      const std::uint32_t swapped = (x[0] ^ x[i]) & lower & ~is_set;
+      x[0] ^= (lower & is_set) | swapped;
+      x[i] ^= swapped;
     }
   }
   for (int i = 1; i < dim; ++i) x[i] ^= x[i - 1];
   std::uint32_t flips = 0;
-  for (std::uint32_t q = top; q > 1; q >>= 1) {
-    if ((x[dim - 1] & q) != 0) flips ^= q - 1;
-  }
+  for (int bit = bits - 1; bit > 0; --bit) flips ^= ((std::uint32_t{1} << bit) - 1) & mask_of(x[dim - 1], bit);
   for (int i = 0; i < dim; ++i) x[i] ^= flips;
+}
+
+/// The bits of x with one zero between them (31 bits), or two (21 bits).
+std::uint64_t spread_by_one(std::uint64_t x) {
+  x = (x | (x << 16)) & 0x0000ffff0000ffffULL;
+  x = (x | (x << 8)) & 0x00ff00ff00ff00ffULL;
+  x = (x | (x << 4)) & 0x0f0f0f0f0f0f0f0fULL;
+  x = (x | (x << 2)) & 0x3333333333333333ULL;
+  return (x | (x << 1)) & 0x5555555555555555ULL;
+}
+std::uint64_t spread_by_two(std::uint64_t x) {
+  x = (x | (x << 32)) & 0x001f00000000ffffULL;
+  x = (x | (x << 16)) & 0x001f0000ff0000ffULL;
+  x = (x | (x << 8)) & 0x100f00f00f00f00fULL;
+  x = (x | (x << 4)) & 0x10c30c30c30c30c3ULL;
+  return (x | (x << 2)) & 0x1249249249249249ULL;
 }
 
 }  // namespace
@@ -59,11 +75,8 @@ std::uint64_t hilbert_key(const Real* point, int dim, const Box& box) {
     x[axis] = static_cast<std::uint32_t>(share * cells);
   }
   axes_to_transpose(x.data(), bits, dim);
-  std::uint64_t key = 0;
-  for (int bit = bits - 1; bit >= 0; --bit) {
-    for (int i = 0; i < dim; ++i) key = (key << 1) | ((x[static_cast<std::size_t>(i)] >> bit) & 1U);
-  }
-  return key;
+  if (dim == 2) return (spread_by_one(x[0]) << 1) | spread_by_one(x[1]);
+  return (spread_by_two(x[0]) << 2) | (spread_by_two(x[1]) << 1) | spread_by_two(x[2]);
 }
 
 }  // namespace malleus

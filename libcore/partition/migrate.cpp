@@ -118,9 +118,15 @@ MigrationReport migrate(const Communicator& comm, Mesh& mesh, FieldStore& fields
   std::vector<Parcel> outgoing;
   GlobalId sent = 0;
   Cutter cutter(mesh, fields);
+  FieldedPiece staying;
   for (const auto& [rank, load] : sort_by_destination(mesh, destinations)) {
-    outgoing.push_back({rank, to_bytes(cutter.cut(load))});
-    if (rank != comm.rank()) sent += static_cast<GlobalId>(outgoing.back().bytes.size());
+    FieldedPiece cut = cutter.cut(load);
+    if (rank == comm.rank()) {
+      staying = std::move(cut);
+      continue;
+    }
+    outgoing.push_back({rank, to_bytes(cut)});
+    sent += static_cast<GlobalId>(outgoing.back().bytes.size());
   }
   report.sent_bytes = comm.sum(sent);
 
@@ -129,7 +135,17 @@ MigrationReport migrate(const Communicator& comm, Mesh& mesh, FieldStore& fields
   names_only.piece.region_names = mesh.region_names;
   names_only.piece.group_names = mesh.group_names;
   std::vector<FieldedPiece> received = {std::move(names_only)};
-  for (const Parcel& parcel : sparse_exchange(comm, std::move(outgoing))) received.push_back(from_bytes(parcel.bytes));
+  bool has_stayed = false;
+  const auto keep_what_stays = [&](int next_rank) {  // in the order of ranks, as it would arrive
+    if (has_stayed || next_rank < comm.rank()) return;
+    received.push_back(std::move(staying));
+    has_stayed = true;
+  };
+  for (const Parcel& parcel : sparse_exchange(comm, std::move(outgoing))) {
+    keep_what_stays(parcel.rank);
+    received.push_back(from_bytes(parcel.bytes));
+  }
+  keep_what_stays(comm.size());
   mesh = assemble_with_fields(comm, merge_pieces(received), fields);
   return report;
 }

@@ -11,6 +11,7 @@
 #include "partition/balance.hpp"
 #include "partition/interface_release.hpp"
 #include "remesh/interface_strip.hpp"
+#include "remesh/plane_cuts.hpp"
 #include "remesh/selection.hpp"
 
 namespace malleus {
@@ -32,11 +33,11 @@ class DistributedRemesher {
     timed("report", [&] { report_.before = metric_fit(comm_, mesh_, metric()); });
     while (refine_in_stage()) {
     }
-    timed("balance", [&] { spread_over_all(); });
+    spread_over_all();
     remesh_all(options_.local);
     report_.interface_nodes = remesh_strips(options_.local, options_.strip_rounds);
     timed("balance", [&] {
-      balance_along_curve(comm_, mesh_, fields_);
+      if (is_uneven()) deal_by(PlaneCuts(comm_, mesh_.dim, centroids(mesh_), ones(), comm_.size()));
       if (options_.balances_by_cost) balance_by_cost(comm_, mesh_, fields_, solver_work(), false);
     });
     timed("report", [&] { report_.after = metric_fit(comm_, mesh_, metric()); });
@@ -80,20 +81,35 @@ class DistributedRemesher {
     note(divide_along_curve(comm_, mesh_, fields_, weights, ranks, static_cast<int>(report_.rounds.size())));
   }
 
-  /// Divides the mesh among all ranks with short borders, as their strips are remeshed twice.
+  /// Divides the mesh among all ranks by planes. What lies along them is brought to the metric before, while it is
+  /// still inside a rank: interfaces that fit spoil nothing beside them, and little is left to be done again.
   void spread_over_all() {
     if (comm_.size() == 1) return;
-    if (!report_.rounds.empty() || mesh_.total_elements < options_.fewest_elements * comm_.size())
-      spread_along_curve(comm_.size());
-    WorkModel model;
-    model.node = 0;
-    model.factor = predicted_work();
-    PartitionOptions options;
-    options.tolerance = 0.02;
-    options.starts_anew = true;
-    const std::vector<int> here(index(mesh_.elements()), comm_.rank());
-    const PartitionPlan plan = make_partition(comm_, mesh_, model, equal_architecture(comm_.size()), options, here);
-    note(migrate(comm_, mesh_, fields_, plan.parts));
+    const PlaneCuts cuts(comm_, mesh_.dim, centroids(mesh_), predicted_work(), comm_.size());
+    std::vector<std::uint8_t> band = elements_at(comm_, mesh_, cuts, options_.band_layers);
+    if (needs_remesh(band)) timed("remesh bands", [&] { remesh(std::move(band), options_.local); });
+    timed("balance", [&] { deal_by(cuts); });
+  }
+
+  void deal_by(const PlaneCuts& cuts) {
+    const std::vector<Real> points = centroids(mesh_);
+    std::vector<int> parts;
+    for (LocalId e = 0; e < mesh_.elements(); ++e)
+      parts.push_back(cuts.part_of(points.data() + static_cast<std::ptrdiff_t>(e) * mesh_.dim));
+    note(migrate(comm_, mesh_, fields_, parts));
+  }
+
+  /// Are more than a few of the selected elements such as a remesh would better?
+  bool needs_remesh(const std::vector<std::uint8_t>& selected) const {
+    constexpr Real few = 0.02;
+    const std::vector<std::uint8_t> bad = misfits(mesh_, metric(), {});
+    std::array<Real, 2> sums = {0, 0};
+    for (std::size_t e = 0; e < selected.size(); ++e) {
+      sums[0] += selected[e];
+      sums[1] += selected[e] & bad[e];
+    }
+    comm_.sum_in_place(sums);
+    return sums[1] > few * sums[0];
   }
 
   void note(const MigrationReport& moved) {
@@ -114,6 +130,13 @@ class DistributedRemesher {
     remesh_coarser(std::pow(growth, (1 - 1 / stages) / mesh_.dim));
     return true;
   }
+
+  bool is_uneven() const {
+    constexpr Real tolerance = 0.05;
+    const auto largest = static_cast<Real>(comm_.max(static_cast<GlobalId>(mesh_.elements())));
+    return largest > std::max(1.0, static_cast<Real>(mesh_.total_elements) / comm_.size() * (1 + tolerance));
+  }
+  std::vector<Real> ones() const { return std::vector<Real>(index(mesh_.elements()), 1); }
 
   /// Elements to make for each one there is.
   Real growth_of_all() const {
@@ -229,7 +252,7 @@ class DistributedRemesher {
   GlobalId remesh_strips(const RemeshOptions& options, int rounds) {
     // Marks follow the mesh as a field: on nodes that interfaces held in the last remesh.
     fields_.declare(mesh_, {mark_field_name, "1", Support::node, 1});
-    std::vector<std::uint8_t> marks = shared_nodes(mesh_);
+    std::vector<std::uint8_t> marks = misfit_interface();
     for (int round = 0; round < rounds && comm_.any(is_any(marks)); ++round) {
       timed("move interfaces", [&] {
         set_marks(marks);
@@ -258,9 +281,22 @@ class DistributedRemesher {
     remesh(selected, options);
     // Marks of new nodes are interpolated: what was held keeps exactly 1 and its place among the shared nodes.
     std::vector<std::uint8_t> marks = get_marks();
-    const std::vector<std::uint8_t> shared_now = shared_nodes(mesh_);
-    for (std::size_t node = 0; node < marks.size(); ++node)
-      marks[node] = marks[node] != 0 && shared_now[node] != 0 ? 1 : 0;
+    const std::vector<std::uint8_t> misfit = misfit_interface();
+    for (std::size_t node = 0; node < marks.size(); ++node) marks[node] = marks[node] != 0 && misfit[node] != 0 ? 1 : 0;
+    return marks;
+  }
+
+  /// Shared nodes of elements that interfaces kept from fitting: those that fit need no second look.
+  std::vector<std::uint8_t> misfit_interface() const {
+    const std::vector<std::uint8_t> bad = misfits(mesh_, metric(), {});
+    std::vector<std::uint8_t> marks(index(mesh_.nodes()), 0);
+    for (LocalId e = 0; e < mesh_.elements(); ++e) {
+      if (bad[index(e)] == 0) continue;
+      for (const LocalId node : mesh_.nodes_of_element(e)) marks[index(node)] = 1;
+    }
+    level_largest(mesh_, marks);
+    const std::vector<std::uint8_t> shared = shared_nodes(mesh_);
+    for (std::size_t node = 0; node < marks.size(); ++node) marks[node] &= shared[node];
     return marks;
   }
 

@@ -16,6 +16,7 @@ namespace malleus {
 
 struct DistributedRemeshOptions {
   RemeshOptions local;                         ///< of each rank's remeshes
+  int band_layers = 1;                         ///< elements on each side of a new interface, remeshed before the others
   int strip_rounds = 5;                        ///< at most, to remesh what interfaces held
   int moved_layers = 6;                        ///< how many elements far an interface moves
   int strip_layers = 4;                        ///< elements remeshed again on each side of a former interface

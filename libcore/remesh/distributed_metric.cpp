@@ -63,46 +63,66 @@ struct EdgeCounts {
 template <int D, class VertexMetric>
 class Fit {
  public:
-  Fit(const Communicator& comm, const Mesh& mesh, const Metric& metric)
-      : comm_(comm), mesh_(mesh), metrics_(vertex_metrics<VertexMetric>(mesh, metric)) {
+  Fit(const Mesh& mesh, const Metric& metric) : mesh_(mesh), metrics_(vertex_metrics<VertexMetric>(mesh, metric)) {
     points_.resize(metrics_.size());
     for (std::size_t v = 0; v < points_.size(); ++v)
       std::copy_n(mesh.point(static_cast<LocalId>(v)), D, points_[v].begin());
   }
 
-  MetricFit run() {
+  MetricFit run(const Communicator& comm) const {
     MetricFit fit;
-    measure_elements(fit);
-    measure_edges(fit);
+    measure_elements(comm, fit);
+    measure_edges(comm, fit);
     return fit;
   }
 
+  std::vector<std::uint8_t> misfits(const FitBounds& bounds) const {
+    std::vector<std::uint8_t> result(index(mesh_.elements()), 0);
+    for (LocalId e = 0; e < mesh_.elements(); ++e) {
+      bool fits = quality_of(e) >= bounds.least_quality;
+      const auto nodes = mesh_.nodes_of_element(e);
+      for (const auto& [i, j] : remeshing::EdgeTable<D>::nodes) {
+        const Real square = squared_length_of(index(nodes[i]), index(nodes[j]));
+        fits = fits && square >= bounds.shortest && square <= bounds.longest;
+      }
+      result[index(e)] = fits ? 0 : 1;
+    }
+    return result;
+  }
+
  private:
-  void measure_elements(MetricFit& fit) {
+  remeshing::PointPointers<D> points_of(LocalId e) const {
+    remeshing::PointPointers<D> x;
+    for (std::size_t k = 0; k <= D; ++k) x[k] = &points_[index(mesh_.nodes_of_element(e)[k])];
+    return x;
+  }
+  Real quality_of(LocalId e) const {
+    remeshing::MetricPointers<D, VertexMetric> m;
+    for (std::size_t k = 0; k <= D; ++k) m[k] = &metrics_[index(mesh_.nodes_of_element(e)[k])];
+    return remeshing::key_to_quality<D>(remeshing::shape_key<D>(points_of(e), m));
+  }
+  Real squared_length_of(std::size_t a, std::size_t b) const {
+    return remeshing::squared_length<D>(points_[a], metrics_[a], points_[b], metrics_[b]);
+  }
+
+  void measure_elements(const Communicator& comm, MetricFit& fit) const {
     constexpr std::size_t bins = 1000;
     std::vector<GlobalId> histogram(bins, 0);
     Real worst = 2;
     Real sum = 0;
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      remeshing::PointPointers<D> x;
-      remeshing::MetricPointers<D, VertexMetric> m;
-      for (std::size_t k = 0; k <= D; ++k) {
-        const LocalId node = mesh_.nodes_of_element(e)[k];
-        x[k] = &points_[index(node)];
-        m[k] = &metrics_[index(node)];
-      }
-      const Real quality = remeshing::key_to_quality<D>(remeshing::shape_key<D>(x, m));
-      fit.volume += remeshing::scaled_volume<D>(x) / remeshing::factorial<D>;
+      const Real quality = quality_of(e);
+      fit.volume += remeshing::scaled_volume<D>(points_of(e)) / remeshing::factorial<D>;
       worst = std::min(worst, quality);
       fit.inverted += quality > 0 ? 0 : 1;
       sum += quality;
       ++histogram[std::min(bins - 1, static_cast<std::size_t>(quality * bins))];
     }
-    comm_.sum_in_place(std::span(histogram));
-    fit.quality_min = comm_.min(worst);
-    fit.quality_mean = comm_.sum(sum) / static_cast<Real>(std::max<GlobalId>(1, mesh_.total_elements));
-    fit.volume = comm_.sum(fit.volume);
-    fit.inverted = comm_.sum(fit.inverted);
+    comm.sum_in_place(std::span(histogram));
+    fit.quality_min = comm.min(worst);
+    fit.quality_mean = comm.sum(sum) / static_cast<Real>(std::max<GlobalId>(1, mesh_.total_elements));
+    fit.volume = comm.sum(fit.volume);
+    fit.inverted = comm.sum(fit.inverted);
     const Real wanted = 0.01 * static_cast<Real>(mesh_.total_elements);
     Real below = 0;
     std::size_t bin = 0;
@@ -112,7 +132,7 @@ class Fit {
     fit.quality_p01 = std::max(fit.quality_min, (static_cast<Real>(bin) + (wanted - below) / here) / bins);
   }
 
-  void measure_edges(MetricFit& fit) {
+  void measure_edges(const Communicator& comm, MetricFit& fit) const {
     std::vector<std::uint64_t> edges;
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
       const auto nodes = mesh_.nodes_of_element(e);
@@ -127,19 +147,18 @@ class Fit {
     for (const std::uint64_t edge : edges) {
       const auto a = static_cast<std::size_t>(edge >> 32);
       const auto b = static_cast<std::size_t>(edge & 0xffffffffU);
-      const Real square = remeshing::squared_length<D>(points_[a], metrics_[a], points_[b], metrics_[b]);
+      const Real square = squared_length_of(a, b);
       ++counts.all;
       counts.good += square >= 0.5 && square <= 2 ? 1 : 0;
       counts.shortest = std::min(counts.shortest, square);
       counts.longest = std::max(counts.longest, square);
     }
-    const GlobalId all = comm_.sum(counts.all);
-    fit.conforming = all == 0 ? 1 : static_cast<Real>(comm_.sum(counts.good)) / static_cast<Real>(all);
-    fit.edge_min = std::sqrt(comm_.min(counts.shortest));
-    fit.edge_max = std::sqrt(comm_.max(counts.longest));
+    const GlobalId all = comm.sum(counts.all);
+    fit.conforming = all == 0 ? 1 : static_cast<Real>(comm.sum(counts.good)) / static_cast<Real>(all);
+    fit.edge_min = std::sqrt(comm.min(counts.shortest));
+    fit.edge_max = std::sqrt(comm.max(counts.longest));
   }
 
-  const Communicator& comm_;
   const Mesh& mesh_;
   std::vector<VertexMetric> metrics_;
   std::vector<remeshing::Point<D>> points_;
@@ -203,14 +222,26 @@ void scale_to_nodes(const Communicator& comm, const Mesh& mesh, Metric& metric, 
   }
 }
 
-MetricFit metric_fit(const Communicator& comm, const Mesh& mesh, const Metric& metric) {
+namespace {
+
+template <class Visit>
+auto with_fit(const Mesh& mesh, const Metric& metric, Visit&& visit) {
   const bool tensors = metric.kind() == Metric::Kind::tensors;
-  if (mesh.dim == 2) {
-    return tensors ? Fit<2, remeshing::TensorMetric<2>>(comm, mesh, metric).run()
-                   : Fit<2, remeshing::SizeMetric<2>>(comm, mesh, metric).run();
-  }
-  return tensors ? Fit<3, remeshing::TensorMetric<3>>(comm, mesh, metric).run()
-                 : Fit<3, remeshing::SizeMetric<3>>(comm, mesh, metric).run();
+  if (mesh.dim == 2)
+    return tensors ? visit(Fit<2, remeshing::TensorMetric<2>>(mesh, metric))
+                   : visit(Fit<2, remeshing::SizeMetric<2>>(mesh, metric));
+  return tensors ? visit(Fit<3, remeshing::TensorMetric<3>>(mesh, metric))
+                 : visit(Fit<3, remeshing::SizeMetric<3>>(mesh, metric));
+}
+
+}  // namespace
+
+MetricFit metric_fit(const Communicator& comm, const Mesh& mesh, const Metric& metric) {
+  return with_fit(mesh, metric, [&](const auto& fit) { return fit.run(comm); });
+}
+
+std::vector<std::uint8_t> misfits(const Mesh& mesh, const Metric& metric, const FitBounds& bounds) {
+  return with_fit(mesh, metric, [&](const auto& fit) { return fit.misfits(bounds); });
 }
 
 }  // namespace malleus

@@ -187,7 +187,9 @@ void Remesher<D, Metric>::settle_sizes() {
   Real threshold = std::numeric_limits<Real>::max();
   for (int round = 0; round < options_.size_rounds && last_rounds < most_last_rounds; ++round) {
     const OperationCounts before = operators_.counts;
-    if (threshold > limits.long_edge) threshold = std::max(limits.long_edge, 0.45 * longest_waiting());
+    // Long edges that may not be split (of interfaces, of a kept surface) must not keep the others waiting.
+    if (threshold > limits.long_edge)
+      threshold = std::max(limits.long_edge, std::min(0.45 * longest_waiting(), 0.8 * threshold));
     timed("split", [&] { split_pass(threshold); });
     timed("collapse", [&] { collapse_pass(0.9 * limits.short_edge); });
     timed("swap", [&] { swap_pass(quality_to_key<D>(D == 3 ? 0.7 : 0.63)); });
