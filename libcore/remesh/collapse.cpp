@@ -93,7 +93,7 @@ template <int D, class Metric>
 bool Operators<D, Metric>::collapse(LocalId v, LocalId w) {
   const Vertex& vertex = mesh_.vertex(v);
   if (vertex.fixed || vertex.dimension == 0 || vertex.dimension < mesh_.vertex(w).dimension) return false;
-  const auto stays_short = [&](LocalId u) { return u == v || mesh_.squared_length_of(u, w) <= limits.longest_made; };
+  const auto stays_short = [&](LocalId u) { return u == v || mesh_.sizing_of(u, w) <= limits.longest_made; };
   if (!cavity_.gather_ball_while(v, stays_short)) return false;
   const Real worst = cavity_.worst_key();
   if (worst <= 0) return false;

@@ -50,6 +50,21 @@ void fix_surface(WorkingMesh<D, VertexMetric>& mesh) {
   for (auto& vertex : mesh.vertices) vertex.fixed = vertex.fixed || vertex.dimension < D;
 }
 
+/// Marks the vertices of curved free surfaces, where edges are wanted shorter.
+template <int D, class VertexMetric>
+void refine_curved(Real finer, WorkingMesh<D, VertexMetric>& mesh) {
+  mesh.bulging_factor = finer * finer;
+  if (!(finer > 1)) return;
+  for (const auto& element : mesh.elements) {
+    for (std::size_t f = 0; f <= D; ++f) {
+      if (element.patch[f] == no_patch) continue;
+      const Patch<D>& patch = mesh.patch(element.patch[f]);
+      if (patch.flat || patch.frozen || patch.two_sided) continue;
+      for (const std::size_t k : FaceTable<D>::nodes[f]) mesh.vertex(element.node[k]).bulges = true;
+    }
+  }
+}
+
 template <int D, class VertexMetric>
 void set_keys(WorkingMesh<D, VertexMetric>& mesh) {
   for (auto& element : mesh.elements) element.key = static_cast<float>(mesh.key_of_element(element));
@@ -65,6 +80,7 @@ RemeshReport remesh_with(RemeshMesh& input, const Metric& metric, const RemeshOp
   set_metrics(metric, mesh);
   classify(input, options.feature_angle * std::numbers::pi / 180, mesh, notes);
   if (options.keep_surface) fix_surface(mesh);
+  refine_curved(options.surface_finer, mesh);
   set_keys(mesh);
   report.nodes_before = input.nodes();
   report.elements_before = input.elements();

@@ -10,11 +10,12 @@
 namespace malleus {
 
 struct RemeshOptions {
-  Real feature_angle = 45;     ///< degrees; edges (corners in 2D) that bend more are kept as features
-  Real hausdorff = 0;          ///< m; faces stay this close to the input surface; 0 = bounded by their slope alone
-  bool keep_surface = false;   ///< no facet changes
-  bool keep_volume = false;    ///< restore each region's volume by a shift of curved free surfaces along normals
-  int size_rounds = 60;        ///< at most, until edge lengths settle
+  Real feature_angle = 45;    ///< degrees; edges (corners in 2D) that bend more are kept as features
+  Real hausdorff = 0;         ///< m; faces stay this close to the input surface; 0 = bounded by their slope alone
+  bool keep_surface = false;  ///< no facet changes
+  bool keep_volume = false;   ///< restore each region's volume by a shift of curved free surfaces along normals
+  Real surface_finer = 1;  ///< >= 1; edges on curved free surfaces are this much shorter: less volume is lost to chords
+  int size_rounds = 60;    ///< at most, until edge lengths settle
   int improvement_rounds = 6;  ///< of swaps and relocation once lengths have settled
 };
 

@@ -21,7 +21,7 @@ struct EdgeExtremes {
   EdgeExtremes(const WorkingMesh<D, Metric>& mesh, const Element<D>& element) {
     for (std::size_t edge = 0; edge < EdgeTable<D>::size; ++edge) {
       const auto [a, b] = EdgeTable<D>::nodes[edge];
-      const Real length = mesh.squared_length_of(element.node[a], element.node[b]);
+      const Real length = mesh.sizing_of(element.node[a], element.node[b]);
       if (length > longest) {
         longest = length;
         longest_edge = edge;
@@ -117,7 +117,7 @@ bool Remesher<D, Metric>::collapse_edges(LocalId e, Real threshold) {
   for (const auto& [i, j] : EdgeTable<D>::nodes) {
     const LocalId a = mesh_.element(e).node[i];
     const LocalId b = mesh_.element(e).node[j];
-    if (mesh_.squared_length_of(a, b) >= threshold) continue;
+    if (mesh_.sizing_of(a, b) >= threshold) continue;
     const std::uint64_t key = edge_key(a, b);
     std::uint64_t& refused = refused_[static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 48)];
     if (refused == key) continue;

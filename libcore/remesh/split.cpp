@@ -104,7 +104,9 @@ bool Operators<D, Metric>::split_at(StarOf star, EntityOf entity, LocalId a, Loc
   mesh_.metric(star.apex) = star.site.metric;
   Vertex& vertex = mesh_.vertex(star.apex);
   const bool waits = vertex.waits;
-  vertex = {-1, entity.id, star.site.input_element, star.site.input_face, entity.dimension, false, false, waits};
+  const bool bulges = entity.dimension < D && mesh_.vertex(a).bulges && mesh_.vertex(b).bulges;
+  vertex = {-1,    entity.id, star.site.input_element, star.site.input_face, entity.dimension, false, false,
+            waits, bulges};
   if (D == 3 && entity.dimension == 1) {
     mesh_.curve_edges.erase(edge_key(a, b));
     mesh_.curve_edges.emplace(edge_key(a, star.apex), entity.id);

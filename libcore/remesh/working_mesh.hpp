@@ -66,10 +66,11 @@ struct Vertex {
   LocalId input_element = -1;  ///< element of the input mesh near it
   LocalId input_face = -1;     ///< surface face or curve edge of the input mesh near it
   std::uint8_t dimension = 3;
-  bool frozen = false;  ///< on a parallel interface
-  bool fixed = false;   ///< may not move or vanish: frozen, or on a surface that is to be kept
-  bool waits = false;   ///< on the list of vertices to relocate
-  LocalId origin = -1;  ///< number of the node in the input, -1: made since
+  bool frozen : 1 = false;  ///< on a parallel interface
+  bool fixed : 1 = false;   ///< may not move or vanish: frozen, or on a surface that is to be kept
+  bool waits : 1 = false;   ///< on the list of vertices to relocate
+  bool bulges : 1 = false;  ///< on a curved free surface, whose chords lose volume
+  LocalId origin = -1;      ///< number of the node in the input, -1: made since
 };
 
 /// A connected piece of boundary or of an interface, bounded by feature edges.
@@ -105,6 +106,7 @@ struct WorkingMesh {
   std::vector<Element<D>> elements;
   std::vector<LocalId> free_elements;
   std::vector<LocalId> free_vertices;
+  Real bulging_factor = 1;            ///< of squared lengths on curved free surfaces, see RemeshOptions::surface_finer
   std::uint32_t stamp = 0;            ///< counts balls: an element with this stamp is in the present one
   std::vector<std::int32_t> regions;  ///< the input's numbers
   std::vector<Patch<D>> patches;
@@ -128,6 +130,11 @@ struct WorkingMesh {
 
   Real squared_length_of(LocalId a, LocalId b) const {
     return squared_length<D>(point(a), metric(a), point(b), metric(b));
+  }
+  /// What decides on splitting and merging: edges on curved free surfaces may be wanted shorter.
+  Real sizing_of(LocalId a, LocalId b) const {
+    const Real length = squared_length_of(a, b);
+    return vertex(a).bulges && vertex(b).bulges ? bulging_factor * length : length;
   }
   PointPointers<D> points_of(const Element<D>& e) const {
     PointPointers<D> x;

@@ -98,6 +98,7 @@ int run(int argc, char** argv) {
   app.add_option("--metric", metric_file);
   app.add_option("--rounds", options.improvement_rounds);
   app.add_option("--hausdorff", options.hausdorff);
+  app.add_option("--surface-finer", options.surface_finer);
   app.add_flag("--keep-volume", options.keep_volume);
   app.add_flag("--keep-surface", options.keep_surface);
   CLI11_PARSE(app, argc, argv);

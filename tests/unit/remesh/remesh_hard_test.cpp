@@ -159,6 +159,24 @@ TEST_P(RemeshBall, KeepsTheVolumeWhereAsked) {
   }
 }
 
+/// Chords lose volume with the square of their length: so little that nodes hardly leave the surface to make up for it.
+TEST_P(RemeshBall, LosesLessVolumeWithAFinerSurface) {
+  const int dimension = GetParam();
+  std::vector<Real> lost;
+  for (const Real finer : {1.0, 1.3}) {
+    RemeshMesh mesh = ball_mesh(dimension, dimension == 2 ? 48 : 14);
+    const Real before = signed_volume(mesh);
+    RemeshOptions options;
+    options.feature_angle = 60;
+    options.surface_finer = finer;
+    remesh(mesh, Metric::uniform(0.2), options);
+    test::expect_sound(mesh);
+    lost.push_back(before - signed_volume(mesh));
+  }
+  EXPECT_GT(lost[0], 0);
+  EXPECT_LT(lost[1], 0.75 * lost[0]);
+}
+
 /// A ball pressed flat on two sides: volume comes back where the surface is round, the flat sides do not move.
 TEST_P(RemeshBall, KeepsTheVolumeWithoutBulgingFlatSides) {
   const int dimension = GetParam();
