@@ -72,8 +72,8 @@ void add_options(CLI::App& app, PartitionCommand& c) {
       ->check(CLI::IsMember({"refined", "curve", "strips", "keep"}));
   app.add_option("--start", c.start,
                  "What a new partition is refined from: best (default: of the next three that of least cut), curve, "
-                 "coordinate, inertial, or scotch (PT-Scotch)")
-      ->check(CLI::IsMember({"best", "curve", "coordinate", "inertial", "scotch"}));
+                 "coordinate, inertial, growth, or scotch (PT-Scotch)")
+      ->check(CLI::IsMember({"best", "curve", "coordinate", "inertial", "growth", "scotch"}));
   app.add_option("--release", c.release,
                  "With --from: moves the borders between the parts inside them, as a remesher wants; balanced, or "
                  "shifted by a layer whatever the loads")
@@ -254,6 +254,7 @@ int run_partition(const Communicator& comm, const std::vector<std::string>& argu
                                                         {"curve", PartitionStart::curve},
                                                         {"coordinate", PartitionStart::coordinate},
                                                         {"inertial", PartitionStart::inertial},
+                                                        {"growth", PartitionStart::growth},
                                                         {"scotch", PartitionStart::scotch}};
   command.options.start = starts.at(command.start);
   if (command.method == "keep" && command.from.empty()) throw InputError("command line: --method keep wants --from");

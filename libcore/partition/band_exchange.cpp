@@ -13,6 +13,17 @@ void append(std::vector<T>& target, const std::vector<T>& more) {
 
 }  // namespace
 
+void BandPiece::reserve(std::size_t vertices, std::size_t edges) {
+  numbers.reserve(vertices);
+  weights.reserve(vertices);
+  sides.reserve(vertices);
+  outside.reserve(vertices);
+  third.reserve(vertices);
+  degrees.reserve(vertices);
+  neighbours.reserve(edges);
+  edge_weights.reserve(edges);
+}
+
 void BandPiece::put(ByteWriter& writer) const {
   writer.put_list<GlobalId>(numbers);
   writer.put_list<Real>(weights);
@@ -37,27 +48,50 @@ BandPiece BandPiece::get(ByteReader& reader) {
   return piece;
 }
 
-PairProblem join_band(const std::vector<const BandPiece*>& pieces, std::vector<GlobalId>& numbers) {
-  PairProblem problem;
-  problem.start.assign(1, 0);
-  std::size_t vertices = 0;
-  for (const BandPiece* piece : pieces) vertices += piece->numbers.size();
-  NumberTable table(vertices);
-  for (const BandPiece* piece : pieces) {
-    for (const GlobalId number : piece->numbers) table.insert(number);
-    append(problem.weights, piece->weights);
-    append(problem.sides, piece->sides);
-    append(problem.outside, piece->outside);
-    append(problem.third, piece->third);
-    append(problem.edge_weights, piece->edge_weights);
-    for (const std::int32_t degree : piece->degrees) problem.start.push_back(problem.start.back() + degree);
+namespace {
+
+/// Neighbours on other ranks by number; places in the pieces count on from piece to piece.
+void join_neighbours(const std::vector<BandPiece>& pieces, std::span<const GlobalId> numbers, PairProblem& problem) {
+  NumberTable table(pieces.size() > 1 ? numbers.size() : 0);
+  if (pieces.size() > 1) {
+    for (const GlobalId number : numbers) table.insert(number);
+    check(static_cast<std::size_t>(table.size()) == numbers.size(), "a vertex is in a band once");
   }
   problem.neighbours.reserve(problem.edge_weights.size());
-  for (const BandPiece* piece : pieces) {
-    for (const GlobalId number : piece->neighbours) problem.neighbours.push_back(table.find(number));
+  LocalId first = 0;
+  for (const BandPiece& piece : pieces) {
+    for (const GlobalId neighbour : piece.neighbours) {
+      problem.neighbours.push_back(neighbour < 0 ? first + BandPiece::place_of(neighbour) : table.find(neighbour));
+    }
+    first += static_cast<LocalId>(piece.numbers.size());
   }
-  check(static_cast<std::size_t>(table.size()) == vertices, "a vertex is in a band once");
-  numbers = std::move(table).take_numbers();
+}
+
+}  // namespace
+
+PairProblem join_band(std::vector<BandPiece> pieces, std::vector<GlobalId>& numbers) {
+  PairProblem problem;
+  BandPiece& first = pieces.front();
+  numbers = first.numbers;
+  problem.weights = std::move(first.weights);
+  problem.sides = std::move(first.sides);
+  problem.outside = std::move(first.outside);
+  problem.third = std::move(first.third);
+  problem.edge_weights = std::move(first.edge_weights);
+  for (std::size_t i = 1; i < pieces.size(); ++i) {
+    append(numbers, pieces[i].numbers);
+    append(problem.weights, pieces[i].weights);
+    append(problem.sides, pieces[i].sides);
+    append(problem.outside, pieces[i].outside);
+    append(problem.third, pieces[i].third);
+    append(problem.edge_weights, pieces[i].edge_weights);
+  }
+  problem.start.reserve(numbers.size() + 1);
+  problem.start.push_back(0);
+  for (const BandPiece& piece : pieces) {
+    for (const std::int32_t degree : piece.degrees) problem.start.push_back(problem.start.back() + degree);
+  }
+  join_neighbours(pieces, numbers, problem);
   return problem;
 }
 

@@ -17,7 +17,8 @@ std::vector<LocalId> match(const WorkGraph& graph, std::span<const int> parts, R
     for (std::size_t j = graph.first(v); j < graph.last(v); ++j) {
       const LocalId other = graph.neighbours[j];
       const auto o = static_cast<std::size_t>(other);
-      if (other >= graph.owned() || other == v || coarse_of[o] >= 0 || parts[o] != parts[i]) continue;
+      if (other >= graph.owned() || other == v || coarse_of[o] >= 0) continue;
+      if (!parts.empty() && parts[o] != parts[i]) continue;
       if (graph.weights[i] + graph.weights[o] > heaviest) continue;
       const bool is_better =
           graph.edge_weights[j] > strongest ||

@@ -15,7 +15,7 @@ struct CoarseGraph {
 };
 
 /// Merges neighbours of this rank and of one part across their heaviest edges, lighter neighbours first, up to
-/// `heaviest` weight. parts: [vertex], copies up to date. Collective.
+/// `heaviest` weight. parts: [vertex], copies up to date, or empty where there are none yet. Collective.
 CoarseGraph coarsen(const Communicator& comm, const WorkGraph& graph, std::span<const int> parts, Real heaviest);
 
 }  // namespace malleus

@@ -2,6 +2,8 @@
 
 /// Refinement on ever finer graphs.
 
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "partition/pair_refiner.hpp"
@@ -11,26 +13,31 @@ namespace malleus {
 struct MultilevelSettings {
   Real tolerance = 0.01;       ///< imbalance aimed at on the given graph; coarser ones have three times as much
   int vertices_per_part = 40;  ///< at which coarsening ends
-  int coarse_passes = 4;
-  int fine_passes = 2;
 };
 
-struct Refined {
+/// A way to divide a graph from scratch.
+struct StartMaker {
+  /// A part for each owned vertex. Collective on the graph's communicator, which may be of one rank.
+  std::function<std::vector<int>(const Communicator&, const WorkGraph&)> make;
+  bool is_for_coarsest = false;  ///< goes by edges, not by places: made on the coarsest graph alone
+};
+
+struct Divided {
   std::vector<int> parts;  ///< [owned vertex]
   std::size_t start = 0;   ///< the one that it was made from
 };
 
-/// Improves starts, each a part for each owned vertex, towards targets [part]: neighbours of one part and rank are
-/// merged level by level; on the coarsest graph the loads are levelled, and on each level back borders are improved.
-/// Coarse vertices make large changes cheap. Of several starts the one that cuts least on its coarsest graph is carried
-/// on. What was done is added to count. Collective.
-Refined refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                          std::vector<std::vector<int>> starts, const std::vector<Real>& targets,
-                          const MultilevelSettings& settings, RefinementCount& count);
+/// Improves parts, one for each owned vertex, towards targets [part]: neighbours of one part and rank are merged level
+/// by level; on the coarsest graph the loads are levelled, and on each level back borders are improved. Coarse vertices
+/// make large changes cheap. What was done is added to count. Collective.
+std::vector<int> refine_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                                   std::vector<int> parts, const std::vector<Real>& targets,
+                                   const MultilevelSettings& settings, RefinementCount& count);
 
-/// Edges of the graph between parts, divided by the bandwidths of their links; both directions. parts: [owned vertex].
-/// Collective.
-Real linked_cut(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
-                std::vector<int> parts);
+/// The same without parts: neighbours of one rank are merged, the coarsest graph is divided by each of the starts and
+/// refined, and the one that cuts least there is carried on. Collective.
+Divided divide_multilevel(const Communicator& comm, const WorkGraph& graph, const Architecture& architecture,
+                          std::span<const StartMaker> starts, const std::vector<Real>& targets,
+                          const MultilevelSettings& settings, RefinementCount& count);
 
 }  // namespace malleus

@@ -24,6 +24,7 @@ void PairRefiner::start(std::vector<int> parts) {
   parts_ = std::move(parts);
   loads_ = part_loads(comm_, graph_, parts_, architecture_.parts());
   mark_.assign(parts_.size(), 0);
+  place_.assign(static_cast<std::size_t>(graph_.owned()), 0);
   round_ = 0;
   handed_.assign(comm_.size() > 1 ? parts_.size() : 0, 0);
   candidates_.clear();
@@ -245,44 +246,54 @@ std::vector<LocalId> PairRefiner::mark_bands(std::span<const PairGoal> goals) {
   return band;
 }
 
-PairRefiner::PieceLists PairRefiner::cut_pieces(std::span<const PairGoal> goals, std::span<const LocalId> band) const {
+PairRefiner::PieceLists PairRefiner::cut_pieces(std::span<const PairGoal> goals, std::span<const LocalId> band) {
+  std::vector<std::array<std::size_t, 2>> sizes(goals.size(), {0, 0});  // vertices and edges
+  for (const LocalId v : band) {
+    std::array<std::size_t, 2>& size = sizes[static_cast<std::size_t>(goal_of(v))];
+    place_[static_cast<std::size_t>(v)] = static_cast<LocalId>(size[0]++);
+    size[1] += graph_.last(v) - graph_.first(v);
+  }
   std::vector<BandPiece> pieces(goals.size());
-  const bool has_third = !architecture_.has_equal_links();
+  for (std::size_t g = 0; g < goals.size(); ++g) pieces[g].reserve(sizes[g][0], sizes[g][1]);
   for (const LocalId v : band) {
     const auto g = static_cast<std::size_t>(goal_of(v));
-    const PairGoal& goal = goals[g];
-    BandPiece& piece = pieces[g];
-    std::array<Real, 2> outside = {0, 0};
-    Real third = 0;
-    std::int32_t degree = 0;
-    for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
-      const LocalId other = graph_.neighbours[j];
-      const int part = part_of(other);
-      const std::int32_t weight = graph_.edge_weights[j];
-      if (part != goal.p && part != goal.q) {
-        if (has_third) {
-          third += weight * (architecture_.inverse_link(goal.p, part) - architecture_.inverse_link(goal.q, part));
-        }
-      } else if (mark_[static_cast<std::size_t>(other)] == round_) {
-        piece.neighbours.push_back(graph_.number(other));
-        piece.edge_weights.push_back(weight);
-        ++degree;
-      } else {
-        outside[part == goal.p ? 0 : 1] += weight;
-      }
-    }
-    piece.numbers.push_back(graph_.number(v));
-    piece.weights.push_back(graph_.weights[static_cast<std::size_t>(v)]);
-    piece.sides.push_back(part_of(v) == goal.p ? 0 : 1);
-    piece.outside.push_back(outside);
-    piece.third.push_back(third);
-    piece.degrees.push_back(degree);
+    add_to_piece(v, goals[g], pieces[g]);
   }
   PieceLists lists;
   for (std::size_t g = 0; g < goals.size(); ++g) {
     if (!pieces[g].numbers.empty()) lists[static_cast<int>(g)].push_back(std::move(pieces[g]));
   }
   return lists;
+}
+
+void PairRefiner::add_to_piece(LocalId v, const PairGoal& goal, BandPiece& piece) const {
+  const bool has_third = !architecture_.has_equal_links();
+  std::array<Real, 2> outside = {0, 0};
+  Real third = 0;
+  std::int32_t degree = 0;
+  for (std::size_t j = graph_.first(v); j < graph_.last(v); ++j) {
+    const LocalId other = graph_.neighbours[j];
+    const int part = part_of(other);
+    const std::int32_t weight = graph_.edge_weights[j];
+    if (part != goal.p && part != goal.q) {
+      if (has_third)
+        third += weight * (architecture_.inverse_link(goal.p, part) - architecture_.inverse_link(goal.q, part));
+    } else if (mark_[static_cast<std::size_t>(other)] == round_) {
+      const bool is_here = other < graph_.owned();
+      piece.neighbours.push_back(is_here ? BandPiece::here(place_[static_cast<std::size_t>(other)])
+                                         : graph_.number(other));
+      piece.edge_weights.push_back(weight);
+      ++degree;
+    } else {
+      outside[part == goal.p ? 0 : 1] += weight;
+    }
+  }
+  piece.numbers.push_back(graph_.number(v));
+  piece.weights.push_back(graph_.weights[static_cast<std::size_t>(v)]);
+  piece.sides.push_back(part_of(v) == goal.p ? 0 : 1);
+  piece.outside.push_back(outside);
+  piece.third.push_back(third);
+  piece.degrees.push_back(degree);
 }
 
 int PairRefiner::worker_of(const PairGoal& goal) const {
@@ -314,15 +325,13 @@ PairRefiner::PieceLists PairRefiner::send_pieces(PieceLists pieces, std::span<co
   return kept;
 }
 
-std::vector<PairRefiner::Answer> PairRefiner::solve(const PieceLists& pieces, std::span<const PairGoal> goals,
+std::vector<PairRefiner::Answer> PairRefiner::solve(PieceLists pieces, std::span<const PairGoal> goals,
                                                     const RefinementSettings& settings) {
   std::vector<Answer> answers;
-  for (const auto& [g, list] : pieces) {
+  for (auto& [g, list] : pieces) {
     const PairGoal& goal = goals[static_cast<std::size_t>(g)];
-    std::vector<const BandPiece*> pointers;
-    for (const BandPiece& piece : list) pointers.push_back(&piece);
     std::vector<GlobalId> numbers;
-    PairProblem problem = join_band(pointers, numbers);
+    PairProblem problem = join_band(std::move(list), numbers);
     problem.link_cost = architecture_.inverse_link(goal.p, goal.q);
     problem.loads = {loads_[static_cast<std::size_t>(goal.p)], loads_[static_cast<std::size_t>(goal.q)]};
     problem.aims = goal.aims;
@@ -443,7 +452,7 @@ GlobalId PairRefiner::absorb_pieces() {
 
 bool PairRefiner::tidy(Real tolerance) {
   const std::vector<int> before = parts_;
-  const Real allowed = std::max(1.5 * tolerance, 1.1 * imbalance());
+  const Real allowed = std::max(1.05 * tolerance, imbalance());
   if (absorb_pieces() == 0) return false;
   diffuse(tolerance, 4);
   if (imbalance() <= allowed) return true;

@@ -111,10 +111,10 @@ class PairRefiner {
   std::vector<LocalId> mark_bands(std::span<const PairGoal> goals);
   void mark(LocalId vertex, std::vector<LocalId>& layer);
   void hand_marks_to_owners(std::vector<LocalId>& layer);
-  PieceLists cut_pieces(std::span<const PairGoal> goals, std::span<const LocalId> band) const;
+  PieceLists cut_pieces(std::span<const PairGoal> goals, std::span<const LocalId> band);
+  void add_to_piece(LocalId vertex, const PairGoal& goal, BandPiece& piece) const;
   PieceLists send_pieces(PieceLists pieces, std::span<const PairGoal> goals) const;
-  std::vector<Answer> solve(const PieceLists& pieces, std::span<const PairGoal> goals,
-                            const RefinementSettings& settings);
+  std::vector<Answer> solve(PieceLists pieces, std::span<const PairGoal> goals, const RefinementSettings& settings);
   void apply(const std::vector<Answer>& answers);
   PairGoal balanced_goal(const QuotientEdge& edge, Real tolerance, int depth) const;
   GlobalId send_flows(std::vector<Flow> flows, Real tolerance);
@@ -139,6 +139,7 @@ class PairRefiner {
   std::vector<Real> handed_;        ///< [vertex] scratch: copies marked in this step
   std::vector<int> goal_of_part_;   ///< in the present round, -1 elsewhere
   std::vector<std::int32_t> mark_;  ///< [vertex] the round in which it is in a band
+  std::vector<LocalId> place_;      ///< [owned vertex] in the piece of its band, in the present round
   std::int32_t round_ = 0;
   RefinementCount count_;
 };

@@ -11,6 +11,7 @@
 #include "mesh/curve_partition.hpp"
 #include "mesh/space_filling_curve.hpp"
 #include "partition/bisect.hpp"
+#include "partition/grow_bisect.hpp"
 #include "partition/multilevel.hpp"
 #include "partition/relabel.hpp"
 #include "partition/scotch_start.hpp"
@@ -52,6 +53,18 @@ class PhaseClock {
   std::clock_t processor_start_ = std::clock();
   Real processor_ = 0;
 };
+
+/// Stretches of the space-filling curve through the vertices, in proportion to the shares.
+std::vector<int> curve_parts(const Communicator& comm, const WorkGraph& graph, std::span<const Real> shares) {
+  const Box box = bounding_box(comm, graph.centres, graph.dim);
+  std::vector<std::uint64_t> keys(graph.weights.size());
+  std::vector<GlobalId> weights(graph.weights.size());
+  for (std::size_t v = 0; v < keys.size(); ++v) {
+    keys[v] = hilbert_key(graph.centres.data() + v * static_cast<std::size_t>(graph.dim), graph.dim, box);
+    weights[v] = static_cast<GlobalId>(graph.weights[v]);
+  }
+  return curve_partition(comm, keys, weights, shares);
+}
 
 /// A partition on its way, with its name and cost.
 struct Candidate {
@@ -116,19 +129,8 @@ class Planner {
     return cost;
   }
 
-  std::vector<int> curve_parts() const {
-    const Box box = bounding_box(comm_, mesh_.coordinates, mesh_.dim);
-    std::vector<std::uint64_t> keys(graph_.weights.size());
-    std::vector<GlobalId> weights(graph_.weights.size());
-    for (std::size_t e = 0; e < keys.size(); ++e) {
-      keys[e] = hilbert_key(graph_.centres.data() + e * static_cast<std::size_t>(graph_.dim), graph_.dim, box);
-      weights[e] = static_cast<GlobalId>(graph_.weights[e]);
-    }
-    return curve_partition(comm_, keys, weights, architecture_.speed);
-  }
-
   Candidate along_curve() {
-    Candidate candidate = {curve_parts(), "curve", {}, 0};
+    Candidate candidate = {curve_parts(comm_, graph_, architecture_.speed), "curve", {}, 0};
     candidate.cost = cost_of(candidate.parts);
     return candidate;
   }
@@ -143,43 +145,60 @@ class Planner {
     return candidate;
   }
 
-  Refined refine(std::vector<std::vector<int>> starts) {
+  MultilevelSettings multilevel_settings() const {
     MultilevelSettings settings;
     settings.tolerance = options_.tolerance;
-    return refine_multilevel(comm_, graph_, architecture_, std::move(starts), targets_, settings, count_);
+    return settings;
   }
 
-  Candidate make_start(PartitionStart start) const {
+  std::vector<int> refine(std::vector<int> parts) {
+    return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, multilevel_settings(), count_);
+  }
+
+  StartMaker start_maker(PartitionStart start) const {
+    const std::vector<Real>& speeds = architecture_.speed;
     switch (start) {
       case PartitionStart::coordinate:
-        return {bisect(comm_, graph_, architecture_.speed, BisectionAxis::coordinate), "coordinate bisection", {}, 0};
+        return {[&](const auto& comm, const auto& graph) {
+          return bisect(comm, graph, speeds, BisectionAxis::coordinate);
+        }};
       case PartitionStart::inertial:
-        return {bisect(comm_, graph_, architecture_.speed, BisectionAxis::inertial), "inertial bisection", {}, 0};
-      case PartitionStart::scotch:
-        if (architecture_.parts() > graph_.ownership.total()) break;  // its parts are never empty
-        return {scotch_parts(comm_, graph_, architecture_.speed), "PT-Scotch", {}, 0};
+        return {
+            [&](const auto& comm, const auto& graph) { return bisect(comm, graph, speeds, BisectionAxis::inertial); }};
+      case PartitionStart::growth:
+        return {[&](const auto& comm, const auto& graph) { return grow_bisect(comm, graph, speeds); }, true};
       default:
-        break;
+        return {[&](const auto& comm, const auto& graph) { return curve_parts(comm, graph, speeds); }};
     }
-    return {curve_parts(), "curve", {}, 0};
   }
 
-  /// The chosen start, or the best of the geometric ones, refined.
+  /// The chosen start, or the best of our own, refined.
   Candidate anew() {
-    std::vector<Candidate> starts;
-    if (options_.start == PartitionStart::best) {
-      for (const auto start : {PartitionStart::coordinate, PartitionStart::inertial, PartitionStart::curve})
-        starts.push_back(make_start(start));
+    Candidate candidate;
+    // PT-Scotch's parts are never empty.
+    if (options_.start == PartitionStart::scotch && architecture_.parts() <= graph_.ownership.total()) {
+      candidate.parts = refine(scotch_parts(comm_, graph_, architecture_.speed));
+      candidate.made_by = "PT-Scotch and refinement";
     } else {
-      starts.push_back(make_start(options_.start));
+      std::vector<PartitionStart> chosen = {PartitionStart::coordinate, PartitionStart::inertial, PartitionStart::curve,
+                                            PartitionStart::growth};
+      if (options_.start == PartitionStart::scotch) chosen = {PartitionStart::curve};
+      if (options_.start != PartitionStart::best && options_.start != PartitionStart::scotch) chosen = {options_.start};
+      std::vector<StartMaker> makers;
+      for (const PartitionStart start : chosen) makers.push_back(start_maker(start));
+      Divided divided =
+          divide_multilevel(comm_, graph_, architecture_, makers, targets_, multilevel_settings(), count_);
+      candidate.parts = std::move(divided.parts);
+      candidate.made_by = name_of(chosen[divided.start]) + " and refinement";
     }
-    std::vector<std::vector<int>> parts;
-    for (const Candidate& start : starts) parts.push_back(start.parts);
-    clock_.end("start");
-    Refined refined = refine(std::move(parts));
-    Candidate candidate = {std::move(refined.parts), starts[refined.start].made_by + " and refinement", {}, 0};
     candidate.cost = cost_of(candidate.parts);
     return levelled(std::move(candidate));
+  }
+
+  static std::string name_of(PartitionStart start) {
+    if (start == PartitionStart::coordinate) return "coordinate bisection";
+    if (start == PartitionStart::inertial) return "inertial bisection";
+    return start == PartitionStart::growth ? "growth" : "curve";
   }
 
   /// From the present partition by flows, or anew where that is predicted to be cheaper.
@@ -189,7 +208,7 @@ class Planner {
       finish(present, other);
       return other;
     }
-    Candidate best = {refine({present.parts}).parts, "flows and refinement", {}, 0};
+    Candidate best = {refine(present.parts), "flows and refinement", {}, 0};
     best.cost = cost_of(best.parts);
     finish(present, best);
     if (present.cost.imbalance > start_anew_from) {

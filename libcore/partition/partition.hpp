@@ -21,10 +21,11 @@ enum class Partitioner {
 
 /// What a new partition is refined from.
 enum class PartitionStart {
-  best,        ///< coordinate or inertial bisection or the curve, whichever cuts least on a coarse graph
+  best,        ///< one of the next four, whichever cuts least on a coarse graph
   curve,       ///< stretches of the space-filling curve
   coordinate,  ///< recursive coordinate bisection
   inertial,    ///< recursive inertial bisection
+  growth,      ///< recursive bisection by edges, of a coarse graph (grow_bisect.hpp)
   scotch,      ///< PT-Scotch (scotch_start.hpp)
 };
 

@@ -92,7 +92,8 @@ TEST_P(Partitions, StartFromWhateverIsAskedFor) {
   PartitionOptions options;
   for (const auto& [start, name] :
        {std::pair(PartitionStart::curve, "curve"), std::pair(PartitionStart::coordinate, "coordinate bisection"),
-        std::pair(PartitionStart::inertial, "inertial bisection"), std::pair(PartitionStart::scotch, "PT-Scotch")}) {
+        std::pair(PartitionStart::inertial, "inertial bisection"), std::pair(PartitionStart::growth, "growth"),
+        std::pair(PartitionStart::scotch, "PT-Scotch")}) {
     options.start = start;
     if (start == PartitionStart::scotch && !has_scotch()) {
       EXPECT_THROW(make_partition(world(), mesh, paper_times(), equal_architecture(4), options), InputError);
