@@ -83,15 +83,15 @@ void fill_modes(int dim, const Real* offset, bool rigid, Eigen::Ref<Eigen::Matri
 class CoarseSpaceBuilder {
  public:
   CoarseSpaceBuilder(const Communicator& comm, const MultigridLevel& level, const Aggregates& aggregates,
-                     const Ownership& coarse, int dim, bool rigid, const NodeConstraints* constraints)
+                     const Ownership& coarse, AggregateModes modes, const NodeConstraints* constraints)
       : comm_(comm),
         level_(level),
         aggregates_(aggregates),
         coarse_(coarse),
-        dim_(dim),
-        rigid_(rigid),
+        dim_(modes.dim),
+        rigid_(modes.rigid),
         constraints_(constraints),
-        modes_(coarse_modes(dim, rigid)),
+        modes_(coarse_modes(modes.dim, modes.rigid)),
         first_(comm.sum_of_lower_ranks(static_cast<GlobalId>(aggregates.count))) {}
 
   CoarseSpace run() {
@@ -312,8 +312,8 @@ void estimate_largest_eigenvalue(const Communicator& comm, MultigridLevel& level
 }
 
 CoarseSpace make_coarse_space(const Communicator& comm, const MultigridLevel& level, const Aggregates& aggregates,
-                              const Ownership& coarse, int dim, bool rigid, const NodeConstraints* constraints) {
-  return CoarseSpaceBuilder(comm, level, aggregates, coarse, dim, rigid, constraints).run();
+                              const Ownership& coarse, AggregateModes modes, const NodeConstraints* constraints) {
+  return CoarseSpaceBuilder(comm, level, aggregates, coarse, modes, constraints).run();
 }
 
 }  // namespace malleus

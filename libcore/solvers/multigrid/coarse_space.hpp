@@ -40,6 +40,12 @@ void invert_diagonals(MultigridLevel& level);
 /// Fills level.largest_eigenvalue by power iteration from a fixed start. Collective.
 void estimate_largest_eigenvalue(const Communicator& comm, MultigridLevel& level);
 
+/// How an aggregate can move as a whole.
+struct AggregateModes {
+  int dim = 3;
+  bool rigid = false;  ///< rotations besides translations
+};
+
 /// Points [coarse owned][dim] of the aggregates and their scale, and P = (I - omega D^-1 A) P0 with omega = 4/(3
 /// lambda): P0 the modes on aggregates. Where i and j are coupled weakly, A_ij meets the modes of i's aggregate at j in
 /// place of those of j's (Vanek's filtered matrix, made to keep rotations as well): on flattened elements the coarse
@@ -51,6 +57,6 @@ struct CoarseSpace {
   Real scale = 1;
 };
 CoarseSpace make_coarse_space(const Communicator& comm, const MultigridLevel& level, const Aggregates& aggregates,
-                              const Ownership& coarse, int dim, bool rigid, const NodeConstraints* constraints);
+                              const Ownership& coarse, AggregateModes modes, const NodeConstraints* constraints);
 
 }  // namespace malleus

@@ -170,7 +170,7 @@ class SmoothedAggregation final : public VelocityMultigrid {
     const int modes = coarse_modes(dim_, settings_.rigid_modes);
     const Ownership ownership = coarse_ownership(comm_, aggregates.count, settings_, modes);
     CoarseSpace space =
-        make_coarse_space(comm_, level, aggregates, ownership, dim_, settings_.rigid_modes, constraints);
+        make_coarse_space(comm_, level, aggregates, ownership, {dim_, settings_.rigid_modes}, constraints);
     make_coarse_operator(comm_, level, space.prolongator, next);
     next.points = std::move(space.points);
     next.scale = space.scale;

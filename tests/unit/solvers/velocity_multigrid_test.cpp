@@ -104,7 +104,8 @@ TEST(VelocityMultigrid, RigidMotionsHaveNoEnergyOnCoarseLevels) {
     estimate_largest_eigenvalue(world(), fine);
     const Aggregates aggregates = aggregate(fine.layout, fine.graph, fine.values, dim, 0.15, fine.left_out);
     const Ownership ownership(world(), aggregates.count);
-    CoarseSpace space = make_coarse_space(world(), fine, aggregates, ownership, dim, true, scene.system().constraints);
+    CoarseSpace space =
+        make_coarse_space(world(), fine, aggregates, ownership, {dim, true}, scene.system().constraints);
     MultigridLevel coarse;
     make_coarse_operator(world(), fine, space.prolongator, coarse);
     const int modes = coarse_modes(dim, true);
