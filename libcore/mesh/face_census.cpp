@@ -14,6 +14,52 @@ GlobalId lowest(const FaceNumbers& face) {
   return *std::find_if(face.begin(), face.end() - 1, [](GlobalId number) { return number >= 0; });
 }
 
+/// A face and its sense in the lowest bit of the last number.
+FaceNumbers with_sense(FaceNumbers face, bool sense) {
+  face[2] = 2 * face[2] + (sense ? 1 : 0);
+  return face;
+}
+
+/// Counts faces with senses. Refers to the faces that were added.
+class FaceTable {
+ public:
+  explicit FaceTable(std::size_t faces) {
+    std::size_t size = 16;
+    while (size < faces + faces / 4) size *= 2;
+    slots_.resize(size);
+  }
+  void add(const FaceNumbers& face) {
+    Slot& slot = slot_of(face);
+    slot.face = &face;
+    ++slot.count[sense_of(face)];
+  }
+  FaceCount count(const FaceNumbers& face) {
+    const auto& count = slot_of(face).count;
+    return {count[0] + count[1], count[sense_of(face)]};
+  }
+
+ private:
+  struct Slot {
+    const FaceNumbers* face = nullptr;
+    std::array<std::int32_t, 2> count = {0, 0};
+  };
+
+  static std::size_t sense_of(const FaceNumbers& face) { return static_cast<std::size_t>(face[2] & 1); }
+  static bool are_equal(const FaceNumbers& a, const FaceNumbers& b) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] >> 1 == b[2] >> 1;
+  }
+  Slot& slot_of(const FaceNumbers& face) {
+    std::uint64_t hash = 0;
+    for (const GlobalId number : {face[0], face[1], face[2] >> 1})
+      hash = (hash ^ static_cast<std::uint64_t>(number)) * 0x9E3779B97F4A7C15ULL;
+    std::size_t at = static_cast<std::size_t>(hash >> 20) & (slots_.size() - 1);
+    while (slots_[at].face != nullptr && !are_equal(*slots_[at].face, face)) at = (at + 1) & (slots_.size() - 1);
+    return slots_[at];
+  }
+
+  std::vector<Slot> slots_;
+};
+
 }  // namespace
 
 FaceNumbers face_numbers(std::span<const GlobalId> nodes) {
@@ -39,26 +85,28 @@ std::vector<FaceNumbers> faces_of_elements(int dim, std::span<const GlobalId> el
   return faces;
 }
 
-std::vector<std::int32_t> count_equal_faces(const Communicator& comm, std::span<const FaceNumbers> faces) {
+std::vector<FaceCount> count_equal_faces(const Communicator& comm, std::span<const FaceNumbers> faces,
+                                         std::span<const std::uint8_t> senses) {
   std::map<int, std::vector<FaceNumbers>> sent;
   std::map<int, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const int rank = rendezvous_rank(lowest(faces[i]), comm.size());
-    sent[rank].push_back(faces[i]);
+    sent[rank].push_back(with_sense(faces[i], !senses.empty() && senses[i] != 0));
     places[rank].push_back(i);
   }
-  const auto received = sparse_exchange(comm, sent);
-  std::vector<FaceNumbers> sorted;
-  for (const auto& [rank, keys] : received) sorted.insert(sorted.end(), keys.begin(), keys.end());
-  std::sort(sorted.begin(), sorted.end());
-  std::map<int, std::vector<std::int32_t>> answers;
+  const auto received = sparse_exchange(comm, std::move(sent));
+  std::size_t all = 0;
+  for (const auto& [rank, keys] : received) all += keys.size();
+  FaceTable table(all);
   for (const auto& [rank, keys] : received) {
-    for (const FaceNumbers& key : keys) {
-      const auto range = std::equal_range(sorted.begin(), sorted.end(), key);
-      answers[rank].push_back(static_cast<std::int32_t>(range.second - range.first));
-    }
+    for (const FaceNumbers& key : keys) table.add(key);
   }
-  std::vector<std::int32_t> result(faces.size(), 0);
+  std::map<int, std::vector<FaceCount>> answers;
+  for (const auto& [rank, keys] : received) {
+    answers[rank].reserve(keys.size());
+    for (const FaceNumbers& key : keys) answers[rank].push_back(table.count(key));
+  }
+  std::vector<FaceCount> result(faces.size());
   for (const auto& [rank, counts] : sparse_exchange(comm, answers)) {
     const std::vector<std::size_t>& asked = places.at(rank);
     for (std::size_t i = 0; i < asked.size(); ++i) result[asked[i]] = counts[i];

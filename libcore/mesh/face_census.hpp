@@ -20,7 +20,14 @@ FaceNumbers face_numbers(std::span<const GlobalId> nodes);
 /// The faces of elements, [element][dim+1], face f being opposite node f. element_nodes: [element][dim+1].
 std::vector<FaceNumbers> faces_of_elements(int dim, std::span<const GlobalId> element_nodes);
 
-/// For each face how many of the faces that all ranks gave are equal to it, itself included. Collective.
-std::vector<std::int32_t> count_equal_faces(const Communicator& comm, std::span<const FaceNumbers> faces);
+/// How many of the faces that all ranks gave are equal to one, itself included; and how many of them have its sense.
+struct FaceCount {
+  std::int32_t all = 0;
+  std::int32_t alike = 0;
+};
+
+/// senses: [face] 0 or 1, or empty for all 0. Collective.
+std::vector<FaceCount> count_equal_faces(const Communicator& comm, std::span<const FaceNumbers> faces,
+                                         std::span<const std::uint8_t> senses = {});
 
 }  // namespace malleus

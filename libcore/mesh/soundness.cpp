@@ -89,14 +89,12 @@ bool is_odd(std::span<const GlobalId> nodes) {
   return odd;
 }
 
-/// Faces whose two elements lie on the same side of them once all elements are turned to positive volume: there the
-/// mesh is folded over. Both see such a face in the same sense, others see theirs in opposite ones.
-/// elements_of_face: [element][face].
-GlobalId count_folds(const Communicator& comm, const MeshPiece& piece, std::span<const GlobalId> element_nodes,
-                     std::span<const std::int32_t> elements_of_face) {
+/// In which sense each element sees each of its faces once all elements are turned to positive volume: the two at a
+/// face see it in opposite ones. [element][face] 0 or 1.
+std::vector<std::uint8_t> senses_of_faces(const MeshPiece& piece, std::span<const GlobalId> element_nodes) {
   const auto corners = static_cast<std::size_t>(piece.dim) + 1;
-  std::vector<FaceNumbers> oriented;
-  oriented.reserve(element_nodes.size());
+  std::vector<std::uint8_t> senses;
+  senses.reserve(element_nodes.size());
   for (LocalId e = 0; e < piece.elements(); ++e) {
     const bool is_turned = signed_volume(piece, e) < 0;
     for (int f = 0; f <= piece.dim; ++f) {
@@ -105,19 +103,11 @@ GlobalId count_folds(const Communicator& comm, const MeshPiece& piece, std::span
         nodes[static_cast<std::size_t>(k)] =
             element_nodes[static_cast<std::size_t>(e) * corners + static_cast<std::size_t>(face_node(piece.dim, f, k))];
       }
-      const std::span<const GlobalId> face(nodes.data(), static_cast<std::size_t>(piece.dim));
-      const bool sense = is_odd(face) != is_turned;
-      FaceNumbers numbers = face_numbers(face);
-      numbers[2] = 2 * numbers[2] + (sense ? 1 : 0);
-      oriented.push_back(numbers);
+      const bool odd = is_odd(std::span(nodes).first(static_cast<std::size_t>(piece.dim)));
+      senses.push_back(odd != is_turned ? 1 : 0);
     }
   }
-  const std::vector<std::int32_t> alike = count_equal_faces(comm, oriented);
-  Real folds = 0;
-  for (std::size_t slot = 0; slot < alike.size(); ++slot) {
-    if (alike[slot] == 2 && elements_of_face[slot] == 2) folds += 0.5;
-  }
-  return std::llround(comm.sum(folds));
+  return senses;
 }
 
 std::vector<GlobalId> numbers_of(const MeshPiece& piece, std::span<const LocalId> nodes) {
@@ -140,28 +130,31 @@ GlobalId count_branching(const Communicator& comm, int dim, std::span<const Face
       ridges.push_back(ridge);
     }
   }
-  const std::vector<std::int32_t> counts = count_equal_faces(comm, ridges);
   Real branching = 0;
-  for (const std::int32_t count : counts) branching += count > 2 ? 1.0 / count : 0.0;
+  for (const FaceCount& count : count_equal_faces(comm, ridges)) branching += count.all > 2 ? 1.0 / count.all : 0.0;
   return std::llround(comm.sum(branching));
 }
 
 void add_face_problems(const Communicator& comm, const MeshPiece& piece, ProblemList& problems) {
   const std::vector<GlobalId> element_numbers = numbers_of(piece, piece.element_nodes);
   const std::vector<FaceNumbers> faces = faces_of_elements(piece.dim, element_numbers);
-  const std::vector<std::int32_t> elements_of_face = count_equal_faces(comm, faces);
+  const std::vector<FaceCount> elements_of_face =
+      count_equal_faces(comm, faces, senses_of_faces(piece, element_numbers));
   std::vector<char> is_exterior(faces.size(), 0);
   std::vector<FaceNumbers> exterior;
   Real crowded = 0;
+  Real folds = 0;  // faces whose two elements lie on the same side of them
   for (std::size_t slot = 0; slot < faces.size(); ++slot) {
-    if (elements_of_face[slot] > 2) crowded += 1.0 / elements_of_face[slot];
-    if (elements_of_face[slot] != 1) continue;
+    const FaceCount& count = elements_of_face[slot];
+    if (count.all > 2) crowded += 1.0 / count.all;
+    if (count.all == 2 && count.alike == 2) folds += 0.5;
+    if (count.all != 1) continue;
     is_exterior[slot] = 1;
     exterior.push_back(faces[slot]);
   }
   problems.add(std::llround(comm.sum(crowded)), "crowded faces",
                "faces belong to more than two elements: the mesh is not manifold");
-  problems.add(count_folds(comm, piece, element_numbers, elements_of_face), "folds",
+  problems.add(std::llround(comm.sum(folds)), "folds",
                "faces have both their elements on the same side: the mesh is folded over (meshtool refine repairs it)");
   problems.add(count_branching(comm, piece.dim, exterior), "branching boundary",
                piece.dim == 3 ? "edges have more than two boundary faces: the boundary is not manifold"

@@ -100,10 +100,11 @@ struct FaceFaults {
   bool inner_wrong = false;
 };
 
-FaceFaults find_face_faults(const Mesh& mesh, const std::vector<std::int32_t>& elements_of_face) {
+FaceFaults find_face_faults(const Mesh& mesh, const std::vector<FaceCount>& elements_of_face) {
   const auto n = static_cast<std::size_t>(mesh.dim) + 1;
   FaceFaults faults;
-  faults.not_manifold = std::any_of(elements_of_face.begin(), elements_of_face.end(), [](auto c) { return c > 2; });
+  faults.not_manifold = std::any_of(elements_of_face.begin(), elements_of_face.end(),
+                                    [](const FaceCount& count) { return count.all > 2; });
   std::vector<char> listed(elements_of_face.size(), 0);
   for (LocalId facet = 0; facet < mesh.facets(); ++facet) {
     const int face = face_of_facet(mesh, facet);
@@ -114,14 +115,14 @@ FaceFaults find_face_faults(const Mesh& mesh, const std::vector<std::int32_t>& e
     const auto element = static_cast<std::size_t>(mesh.facet_element[static_cast<std::size_t>(facet)]);
     const std::size_t slot = element * n + static_cast<std::size_t>(face);
     const bool is_exterior = facet < mesh.exterior_facets;
-    if (is_exterior && (elements_of_face[slot] != 1 || listed[slot] != 0)) faults.exterior_wrong = true;
-    if (!is_exterior && (elements_of_face[slot] != 2 || mesh.facet_group[static_cast<std::size_t>(facet)] < 0)) {
+    if (is_exterior && (elements_of_face[slot].all != 1 || listed[slot] != 0)) faults.exterior_wrong = true;
+    if (!is_exterior && (elements_of_face[slot].all != 2 || mesh.facet_group[static_cast<std::size_t>(facet)] < 0)) {
       faults.inner_wrong = true;
     }
     listed[slot] = 1;
   }
   for (std::size_t slot = 0; slot < listed.size(); ++slot) {
-    if (elements_of_face[slot] == 1 && listed[slot] == 0) faults.exterior_wrong = true;
+    if (elements_of_face[slot].all == 1 && listed[slot] == 0) faults.exterior_wrong = true;
   }
   return faults;
 }
@@ -140,8 +141,8 @@ bool facets_are_distinct(const Communicator& comm, const Mesh& mesh) {
   for (std::size_t f = 0; f < mesh.facet_group.size(); ++f) {
     facets.push_back(face_numbers(std::span(numbers).subspan(f * n, n)));
   }
-  const std::vector<std::int32_t> counts = count_equal_faces(comm, facets);
-  return std::all_of(counts.begin(), counts.end(), [](std::int32_t count) { return count == 1; });
+  const std::vector<FaceCount> counts = count_equal_faces(comm, facets);
+  return std::all_of(counts.begin(), counts.end(), [](const FaceCount& count) { return count.all == 1; });
 }
 
 bool names_are_alike(const Communicator& comm, const Mesh& mesh) {

@@ -132,27 +132,42 @@ class Fit {
     fit.quality_p01 = std::max(fit.quality_min, (static_cast<Real>(bin) + (wanted - below) / here) / bins);
   }
 
-  void measure_edges(const Communicator& comm, MetricFit& fit) const {
-    std::vector<std::uint64_t> edges;
-    for (LocalId e = 0; e < mesh_.elements(); ++e) {
-      const auto nodes = mesh_.nodes_of_element(e);
-      for (const auto& [i, j] : remeshing::EdgeTable<D>::nodes) {
-        const auto low = static_cast<std::uint64_t>(std::min(nodes[i], nodes[j]));
-        edges.push_back((low << 32) | static_cast<std::uint64_t>(std::max(nodes[i], nodes[j])));
+  /// Calls visit(a, b) once for each edge, a < b: the upper ends of all elements' edges are gathered by lower end.
+  template <class Visit>
+  void visit_edges(Visit&& visit) const {
+    std::vector<std::int64_t> start(points_.size() + 1, 0);
+    const auto each = [&](auto&& take) {
+      for (LocalId e = 0; e < mesh_.elements(); ++e) {
+        const auto nodes = mesh_.nodes_of_element(e);
+        for (const auto& [i, j] : remeshing::EdgeTable<D>::nodes)
+          take(index(std::min(nodes[i], nodes[j])), std::max(nodes[i], nodes[j]));
+      }
+    };
+    each([&](std::size_t low, LocalId) { ++start[low + 1]; });
+    for (std::size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
+    std::vector<LocalId> upper(static_cast<std::size_t>(start.back()));
+    std::vector<std::int64_t> next(start.begin(), start.end() - 1);
+    each([&](std::size_t low, LocalId high) { upper[static_cast<std::size_t>(next[low]++)] = high; });
+    std::vector<LocalId> seen(points_.size(), -1);
+    for (std::size_t low = 0; low < points_.size(); ++low) {
+      for (std::int64_t n = start[low]; n < start[low + 1]; ++n) {
+        const LocalId high = upper[static_cast<std::size_t>(n)];
+        if (seen[index(high)] == static_cast<LocalId>(low)) continue;
+        seen[index(high)] = static_cast<LocalId>(low);
+        visit(low, index(high));
       }
     }
-    std::sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  }
+
+  void measure_edges(const Communicator& comm, MetricFit& fit) const {
     EdgeCounts counts;
-    for (const std::uint64_t edge : edges) {
-      const auto a = static_cast<std::size_t>(edge >> 32);
-      const auto b = static_cast<std::size_t>(edge & 0xffffffffU);
+    visit_edges([&](std::size_t a, std::size_t b) {
       const Real square = squared_length_of(a, b);
       ++counts.all;
       counts.good += square >= 0.5 && square <= 2 ? 1 : 0;
       counts.shortest = std::min(counts.shortest, square);
       counts.longest = std::max(counts.longest, square);
-    }
+    });
     const GlobalId all = comm.sum(counts.all);
     fit.conforming = all == 0 ? 1 : static_cast<Real>(comm.sum(counts.good)) / static_cast<Real>(all);
     fit.edge_min = std::sqrt(comm.min(counts.shortest));
