@@ -177,6 +177,7 @@ nlohmann::json report_json(const PartitionPlan& plan, const MeshStatistics& mesh
                           {"messages", plan.count.messages}, {"bytes", plan.count.bytes}};
   report["seconds"] = seconds;
   report["processor_seconds"] = plan.processor_seconds;
+  report["graph_processor_seconds"] = plan.graph_processor_seconds;
   report["phases"] = plan.seconds;
   report["wall_s"] = wall;
   report["peak_memory_bytes"] = memory;

@@ -16,7 +16,7 @@ namespace {
 
 /// A graph of at most this many vertices, and so many a part, is refined by each rank for itself, all alike: rounds of
 /// pairs on small graphs are waiting more than work.
-constexpr GlobalId few_vertices = 60000;
+constexpr GlobalId few_vertices = 20000;
 /// Of the bands: a third step from the border costs half as much time again and gains nothing that shows.
 constexpr int band_depth = 2;
 constexpr int coarse_passes = 1;

@@ -37,7 +37,7 @@ class PhaseClock {
     seconds_[phase] += std::chrono::duration<Real>(now - start_).count();
     start_ = now;
     const std::clock_t processor = std::clock();
-    if (phase != "evaluate") processor_ += static_cast<Real>(processor - processor_start_) / CLOCKS_PER_SEC;
+    processor_[phase] += static_cast<Real>(processor - processor_start_) / CLOCKS_PER_SEC;
     processor_start_ = processor;
   }
   std::map<std::string, Real> largest(const Communicator& comm) const {
@@ -45,13 +45,17 @@ class PhaseClock {
     for (const auto& [phase, mine] : seconds_) seconds[phase] = comm.max(mine);
     return seconds;
   }
-  Real processor_seconds() const { return processor_; }
+  /// Of this rank, in one phase.
+  Real processor_seconds(const std::string& phase) const {
+    const auto found = processor_.find(phase);
+    return found == processor_.end() ? 0 : found->second;
+  }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<std::string, Real> seconds_;
   std::clock_t processor_start_ = std::clock();
-  Real processor_ = 0;
+  std::map<std::string, Real> processor_;
 };
 
 /// Stretches of the space-filling curve through the vertices, in proportion to the shares.
@@ -84,9 +88,9 @@ class Planner {
         architecture_(architecture),
         options_(options),
         graph_(build_work_graph(comm, mesh, element_work(comm, mesh, model), model.couplings)) {
+    clock_.end("graph");
     const Real total = comm.sum(std::accumulate(graph_.weights.begin(), graph_.weights.end(), Real{0}));
     for (const Real speed : architecture.speed) targets_.push_back(total * speed / architecture.total_speed());
-    clock_.end("graph");
   }
 
   PartitionPlan run(std::span<const int> from, bool has_start) {
@@ -117,7 +121,8 @@ class Planner {
     if (has_start) plan.moved_elements = count_moved(from, plan.parts);
     plan.count = count_;
     plan.seconds = clock_.largest(comm_);
-    plan.processor_seconds = comm_.max(clock_.processor_seconds());
+    plan.processor_seconds = comm_.max(clock_.processor_seconds("divide"));
+    plan.graph_processor_seconds = comm_.max(clock_.processor_seconds("graph"));
     return plan;
   }
 

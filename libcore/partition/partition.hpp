@@ -49,7 +49,8 @@ struct PartitionPlan {
   std::string made_by;                  ///< what was chosen, in words
   RefinementCount count;                ///< of all that was tried
   std::map<std::string, Real> seconds;  ///< wall time by phase, largest over the ranks
-  Real processor_seconds = 0;           ///< of the rank that used most, evaluation apart
+  Real processor_seconds = 0;           ///< to divide the graph, of the rank that used most
+  Real graph_processor_seconds = 0;     ///< to make the graph from the mesh, likewise
 };
 
 /// Divides the elements of a mesh among the parts of an architecture, on any number of ranks; the mesh stays where it
