@@ -15,7 +15,7 @@ void contacts_in(const ToolShape& shape, const Pose& pose, const Vector& point, 
 Tool::Tool(std::string name, std::unique_ptr<ToolShape> shape, ToolMotion motion, Press press, FrictionSpec friction)
     : name_(std::move(name)),
       shape_(std::move(shape)),
-      motion_(motion),
+      motion_(std::move(motion)),
       press_(std::move(press)),
       friction_(friction) {}
 
