@@ -39,13 +39,13 @@ FIRST = ("METIS", "Scotch", "PT-Scotch", "Zoltan PHG", "Zoltan RIB", "ours")
 
 def first_table(rows):
     head = ["mesh, parts", *(f"F: {who}" for who in FIRST), *(f"cut: {who}" for who in FIRST),
-            "neighbours: METIS, ours", "s: METIS, Scotch, PT-Scotch, ours", "elements alone: F of METIS"]
+            "neighbours: METIS, ours", "s: METIS, Scotch, PT-Scotch, Zoltan RIB, ours", "elements alone: F of METIS"]
     body = []
     for mesh, scenario, parts in scenes(rows, "first"):
         at = {"mesh": mesh, "section": "first", "scenario": scenario, "parts": parts}
         body.append([f"{mesh}, {parts}", *cells(rows, "cost", FIRST, "{:.4f}", **at), *cells(rows, "cut", FIRST, "{:d}", **at),
                      ", ".join(cells(rows, "max_neighbours", ("METIS", "ours"), "{:d}", **at)),
-                     ", ".join(cells(rows, "seconds", ("METIS", "Scotch", "PT-Scotch", "ours"), "{:.2f}", **at)),
+                     ", ".join(cells(rows, "seconds", ("METIS", "Scotch", "PT-Scotch", "Zoltan RIB", "ours"), "{:.2f}", **at)),
                      *cells(rows, "cost", ("METIS, elements",), "{:.3f}", **at)])
     return table(head, body)
 
@@ -88,9 +88,19 @@ def replace(text, name, content):
     return f"{before}{begin}\n{content}\n{end}{rest.split(end, 1)[1]}"
 
 
-def write_page(page, rows):
+def migration_table(store):
+    rows = json.loads((store / "migration.json").read_text())
+    return table(["moved", "ranks", "tetrahedra", "s", "s per million held by a rank", "processor s per million held", "bytes per element moved"],
+                 [(row["moved"], row["ranks"], f"{row['elements']:,}", f"{row['seconds']:.2f}", f"{row['seconds_per_million_held']:.2f}",
+                   f"{row['processor_seconds_per_million_held']:.2f}",
+                   f"{row['bytes_per_element']:.0f}") for row in rows])
+
+
+def write_page(page, rows, store):
     """Puts those tables for which something was measured between their marks in a page."""
     text = page.read_text()
+    if (store / "migration.json").exists():
+        text = replace(text, "migration", migration_table(store))
     for name, make in TABLES.items():
         if scenes(rows, name):
             text = replace(text, name, make(rows))

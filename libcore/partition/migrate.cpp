@@ -108,7 +108,8 @@ FieldedPiece from_bytes(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-MigrationReport migrate(const Communicator& comm, Mesh& mesh, FieldStore& fields, std::span<const int> destinations) {
+MigrationReport migrate(const Communicator& comm, Mesh& mesh, FieldStore& fields, std::span<const int> destinations,
+                        std::size_t piece_bytes) {
   check(destinations.size() == static_cast<std::size_t>(mesh.elements()), "each element has a destination");
   MigrationReport report;
   report.moved_elements = comm.sum(static_cast<GlobalId>(
@@ -141,7 +142,7 @@ MigrationReport migrate(const Communicator& comm, Mesh& mesh, FieldStore& fields
     received.push_back(std::move(staying));
     has_stayed = true;
   };
-  for (const Parcel& parcel : sparse_exchange(comm, std::move(outgoing))) {
+  for (const Parcel& parcel : sparse_exchange(comm, std::move(outgoing), piece_bytes)) {
     keep_what_stays(parcel.rank);
     received.push_back(from_bytes(parcel.bytes));
   }

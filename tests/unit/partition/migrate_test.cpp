@@ -68,6 +68,16 @@ TEST_P(Migration, AnyPlanKeepsMeshAndFields) {
   }
 }
 
+TEST_P(Migration, LongMessagesGoInPieces) {
+  Scene scene(GetParam());
+  constexpr std::size_t piece_bytes = 100;  // a fraction of any of the messages
+  std::vector<int> destinations(static_cast<std::size_t>(scene.mesh.elements()));
+  for (LocalId e = 0; e < scene.mesh.elements(); ++e)
+    destinations[static_cast<std::size_t>(e)] = (world().rank() + 1 + e % 2) % world().size();
+  migrate(world(), scene.mesh, scene.fields, destinations, piece_bytes);
+  scene.expect_sound();
+}
+
 TEST_P(Migration, ABalanceByCostSharesOutWhatOneRankHolds) {
   Scene scene(GetParam());
   migrate(world(), scene.mesh, scene.fields, std::vector<int>(scene.mesh.element_ids.size(), 0));
