@@ -38,6 +38,8 @@ nlohmann::json to_json(const Communicator& comm, const DistributedRemeshReport& 
     }
   }
   wall["total"] = total;
+  nlohmann::json processor = nlohmann::json::object();
+  for (const RemeshPhase& phase : report.phases) processor[phase.name] = phase.processor_s;
   const GlobalId peak = comm.sum(peak_memory_bytes());
   return {
       {"ranks", comm.size()},
@@ -46,6 +48,7 @@ nlohmann::json to_json(const Communicator& comm, const DistributedRemeshReport& 
       {"nodes_before", report.nodes_before},
       {"elements_before", report.elements_before},
       {"wall_s", wall},
+      {"processor_s", processor},
       {"peak_memory_bytes", peak},
       {"quality", quality_json(report.after)},
       {"quality_before", quality_json(report.before)},

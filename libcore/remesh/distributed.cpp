@@ -53,15 +53,13 @@ class DistributedRemesher {
   void timed(const char* name, Work work) {
     if (options_.announces) options_.announces(name);
     const Real start = MPI_Wtime();
+    const auto ticks = std::clock();
     work();
-    const Real seconds = MPI_Wtime() - start;
-    for (RemeshPhase& phase : report_.phases) {
-      if (phase.name == name) {
-        phase.seconds += seconds;
-        return;
-      }
-    }
-    report_.phases.push_back({name, seconds});
+    const auto is_same = [&](const RemeshPhase& known) { return known.name == name; };
+    auto phase = std::find_if(report_.phases.begin(), report_.phases.end(), is_same);
+    if (phase == report_.phases.end()) phase = report_.phases.insert(phase, {name});
+    phase->seconds += MPI_Wtime() - start;
+    phase->processor_s += static_cast<Real>(std::clock() - ticks) / CLOCKS_PER_SEC;
   }
 
   /// Work of each element: what it will become, and what it costs even if it is only looked at or taken away.
@@ -318,7 +316,10 @@ class DistributedRemesher {
     for (GlobalId* count : {&report_.splits, &report_.collapses, &report_.swaps, &report_.moves})
       *count = comm_.sum(*count);
     report_.volume_error = comm_.max(report_.volume_error);
-    for (RemeshPhase& phase : report_.phases) phase.seconds = comm_.max(phase.seconds);
+    for (RemeshPhase& phase : report_.phases) {
+      phase.seconds = comm_.max(phase.seconds);
+      phase.processor_s = comm_.max(phase.processor_s);
+    }
   }
 
   static constexpr const char* wanted_field_name = "remeshing_wanted";

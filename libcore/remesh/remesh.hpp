@@ -19,10 +19,11 @@ struct RemeshOptions {
   int improvement_rounds = 6;  ///< of swaps and relocation once lengths have settled
 };
 
-/// Seconds of processor time of one phase.
+/// One phase: of a rank's remesh, seconds of processor time; of a distributed one, of wall time.
 struct RemeshPhase {
   std::string name;
   Real seconds = 0;
+  Real processor_s = 0;  ///< of a distributed one: processor time of the slowest rank, waiting included
 };
 
 struct RemeshQuality {
