@@ -18,6 +18,8 @@ namespace {
 
 /// Share of the dissipation that may change before the flow is solved again whatever the front did.
 constexpr Real dissipation_guard = 0.2;
+/// Of what a gate asks for, from the start of an increment to its end.
+constexpr Real growth_in_a_step = 2;
 /// Steps are planned at the speed before them: the share of the distance that counts as all of it.
 constexpr Real nearly = 0.75;
 /// Share of switch_fill that rounding may take away: an increment that ends at it has reached it, on any number of
@@ -179,6 +181,32 @@ bool Flow::is_due(const std::vector<GateDrive>& drives) {
   if (flow.update.kind == FlowUpdate::Kind::every) return state_.increments_since_flow > flow.update.every;
   if (state_.travelled >= nearly * flow.update_distance || dissipation_changed()) return true;
   return state_.travelled > 0 && fronts_.is_near_open_vent(flow.update_distance * scene_.element_size);
+}
+
+/// What the gates ask for at a time over what they asked for at the last solve, the largest. Collective.
+Real Flow::growth_of_drives(Real time) const {
+  Real largest = 1;
+  const std::vector<GateDrive> drives = asked_drives(scene_, time);
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const GateState& gate = state_.gates[i];
+    if (gate.switched || gate.drive.kind != drives[i].kind || !(gate.drive.value > 0)) continue;
+    largest = std::max(largest, drives[i].value / gate.drive.value);
+  }
+  return largest;
+}
+
+Real Flow::step_with_gates(Real step) const {
+  const auto& inlets = scene_.settings.inlets;
+  if (!std::isfinite(step) || std::ranges::none_of(inlets, &InletSettings::depends_on_time)) return step;
+  const Real at_start = growth_of_drives(state_.time);
+  Real dt = step / at_start;
+  Real at_end = growth_of_drives(state_.time + dt) / at_start;
+  const Real shortest = dt / at_end;
+  while (at_end > growth_in_a_step && dt > shortest) {
+    dt = std::max(dt / 2, shortest);
+    at_end = growth_of_drives(state_.time + dt) / at_start;
+  }
+  return dt;
 }
 
 /// sum V |eta_new - eta_old| gamma^2 over sum V eta_new gamma^2, with the flow as it was.

@@ -46,6 +46,9 @@ class Flow final : public Component {
   Real freezing_error() const { return freezing_error_; }
   /// Largest step [s] that trapped gas allows.
   Real largest_step() const { return void_ ? void_->largest_step() : std::numeric_limits<Real>::infinity(); }
+  /// A step [s] in which the front may go its stride at the speeds of the last solve, from where the scene stands:
+  /// shortened where gates ask for more at its start than they did then, or much more towards its end. Collective.
+  Real step_with_gates(Real step) const;
   const VoidModel* void_model() const { return void_ ? &*void_ : nullptr; }
   nlohmann::json save() const;
   void load(const nlohmann::json& saved);
@@ -60,6 +63,7 @@ class Flow final : public Component {
   std::vector<GateDrive> present_drives(Real time);
   Outcome advance_inertia(const Increment& increment);
   bool is_due(const std::vector<GateDrive>& drives);
+  Real growth_of_drives(Real time) const;
   bool dissipation_changed();
   void refuse_blocked_vents() const;
   Outcome solve(Real time, Real dt);

@@ -206,7 +206,7 @@ Real FillingProcess::largest_step() {
   }
   const Real rate = flow_ ? front_->crossing_rate() : front_->rate();
   Real dt = rate > 0 ? elements / rate : unlimited;
-  if (flow_) dt = std::min(dt, flow_->largest_step());
+  if (flow_) dt = std::min(flow_->step_with_gates(dt), flow_->largest_step());
   const Real inflow = state_.inflow();
   if (inflow > 0 && filling_->unfilled() > 0) dt = std::min(dt, filling_->unfilled() / inflow);
   return dt;

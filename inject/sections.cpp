@@ -197,6 +197,12 @@ bool InletSettings::has_velocity() const {
   return velocity || has_any(velocity_components);
 }
 
+bool InletSettings::depends_on_time() const {
+  const auto changes = [](const std::optional<Expression>& formula) { return formula && formula->depends_on_time(); };
+  if (velocity && (changes(velocity->speed) || std::ranges::any_of(velocity->vector, changes))) return true;
+  return changes(flow_rate) || changes(pressure) || std::ranges::any_of(velocity_components, changes);
+}
+
 void VentSettings::describe(Section& s) {
   s.string("group", group, "physical surface (curve in 2D) of the vent")
       .required()

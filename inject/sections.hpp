@@ -80,6 +80,7 @@ struct InletSettings {
   void describe(Section& s);
   void validate(Section& s) const;
   bool has_velocity() const;
+  bool depends_on_time() const;  ///< what it asks for
   bool switches() const { return switch_pressure || switch_fill; }
 };
 

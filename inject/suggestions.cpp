@@ -68,11 +68,8 @@ bool are_alike(const FluidSettings& one, const FluidSettings& other) {
 std::optional<std::string> solves_to_leave_out(const InjectCase& settings) {
   if (settings.fluids.size() < 2 || settings.flow.update.kind == FlowUpdate::Kind::once) return std::nullopt;
   if (settings.common.inertia || settings.common.gravity || settings.common.body_force) return std::nullopt;
-  const bool is_steady = std::ranges::all_of(settings.inlets, [](const InletSettings& gate) {
-    const bool changes = (gate.flow_rate && gate.flow_rate->depends_on_time()) ||
-                         (gate.pressure && gate.pressure->depends_on_time()) || gate.switches();
-    return !changes && !(gate.velocity && gate.velocity->speed && gate.velocity->speed->depends_on_time());
-  });
+  const bool is_steady = std::ranges::none_of(
+      settings.inlets, [](const InletSettings& gate) { return gate.depends_on_time() || gate.switches(); });
   const bool is_alike =
       std::ranges::all_of(settings.fluids, [&](const auto& fluid) { return are_alike(fluid, settings.fluids[0]); });
   if (!is_steady || !is_alike) return std::nullopt;

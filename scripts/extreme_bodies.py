@@ -79,3 +79,30 @@ def full_die(bench):
     finished, _ = bench.run_text(closed_die(""), mesh, "accuracy.two_meshes=no")
     return f"force {abs(off).max():.1e} off; {first_error(finished)[:80]}", \
         verdict(abs(off).max() < 2e-3 and finished.returncode == 3 and "die is full" in finished.stderr)
+
+
+@row("a tool that leaves and comes back five times", "contact is found and lost once a stroke, the force never pulls and is that of the closed form")
+def hammering(bench):
+    boxes, m, speed = BoxMesh(2), 0.3, "-0.2 - 2*sin(2*pi*t/0.02)"
+    boxes.add("billet", [0, 0], [1, 1], (6, 6))
+    text = "[mesh]\nfile = billet.msh\n[time]\nend = 0.1\nstep = 5e-4\n" + body("billet", m)
+    text += f'[tool.upper]\nshape = plane\npoint = 0 1\nnormal = 0 -1\nvelocity_y = "{speed}"\n[tool.lower]\nshape = plane\npoint = 0 0\nnormal = 0 1\n'
+    finished, run = bench.run_text(text, boxes.write(bench.folder / "billet.msh"), "accuracy.two_meshes=no")
+    if not ended_well(finished):
+        return failure(finished)
+    time, step, force, volume = (run.history[name] for name in ("time_s", "dt_s", "force_upper_y_N", "volume_m3"))
+    start = time - step  # the force is that at the start of an increment
+
+    def place(at):
+        return 1 - 0.2 * at - 2 * 0.02 / (2 * np.pi) * (1 - np.cos(2 * np.pi * at / 0.02))
+
+    rate = 0.2 + 2 * np.sin(2 * np.pi * start / 0.02)
+    known = 2 * CONSISTENCY * (2 * abs(rate) / place(start)) ** m * volume / place(start)
+    touches = abs(force) > 1e-3 * abs(force).max()
+    rounds = np.count_nonzero(np.diff(touches.astype(int)) == 1) + touches[0]
+    lowest = np.minimum.accumulate(np.append(1.0, place(time)))[:-1]
+    pressed = touches & (rate > 1) & (place(start) < lowest + 1e-9)  # from the start of the increment on
+    errors = abs(force)[pressed] / known[pressed] - 1
+    sign = np.sign(force[np.argmax(abs(force))])
+    return f"{rounds} contacts, force {abs(errors).max():.1%} off in {errors.size} increments", \
+        verdict(rounds == 5 and np.all(sign * force >= -1e-6 * abs(force).max()) and abs(errors).max() < 0.03)

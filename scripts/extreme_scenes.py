@@ -321,6 +321,22 @@ def long_flow(bench):
         verdict(volume < 1e-10 and np.isfinite(pressure) and pressure < 2e6)
 
 
+@row("a flow rate that jumps by 100 in the middle of the filling", "as much came in as was asked for; pressure over flow rate goes on as before within 10 %")
+def flow_jump(bench):
+    finished, run, _ = filling(bench, "inlet.gate.flow_rate=t < 0.4 ? 8e-5 : 8e-3", end="time.end=0.404 s")
+    if not ended_well(finished):
+        return failure(finished)
+    history, volume = run.history, abs(run.summary["accuracy"]["volume_error"])
+    time, is_slow = history["time_s"], history["time_s"] <= 0.4
+    resistance = history["pressure_gate_Pa"] / np.where(is_slow, 8e-5, 8e-3)
+    settled = is_slow & (time > 0.2)
+    way = 8e-5 * np.minimum(time, 0.4) + 8e-3 * np.maximum(time - 0.4, 0)
+    line = np.polyfit(way[settled], resistance[settled], 1)
+    off = resistance[~is_slow][1:] / np.polyval(line, way[~is_slow][1:]) - 1
+    return f"volume {volume:.0e}, pressure over flow rate within {abs(off).max():.1%}, {np.count_nonzero(~is_slow)} increments after the jump", \
+        verdict(volume < 1e-10 and abs(off).max() < 0.1)
+
+
 @row("power law n = 0.1, 8 elements across", "pressure gradient within 5 % of the closed form")
 def shear_thinning(bench):
     finished, run = bench.run("channel/power-law.ini", bench.mesh("channel", "--across", "8"), "fluid.polymer.exponent=0.1",

@@ -25,6 +25,8 @@ constexpr GlobalId most_nodes_of_trials = 100000;  ///< a rank: larger meshes ta
 constexpr Real output_s = 4e-3;
 constexpr Real output_s_per_node = 2e-6;
 constexpr Real checkpoint_s = 15e-3;
+constexpr Real increments_bytes =
+    8e6;  ///< a rank: of outputs, checkpoints and estimates, which steady scenes do without
 constexpr Real growth_after_cut = 1.5;  ///< of the step from one increment to the next
 /// Times the last increment and the longest checkpoint, kept free before the wall time ends.
 constexpr Real wall_time_margin = 1.3;
@@ -132,12 +134,13 @@ void Engine::print_outlook() {
   const Real total = spent + outlook->total_s() + estimates * (outlook->making_s + outlook->coarse_s) +
                      outputs * (output_s * comm_.size() + output_s_per_node * nodes) +
                      (plan.is_steady() ? 0 : checkpoint_s) * comm_.size();
+  const Real bytes = memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0) +
+                     (plan.is_steady() ? 0 : increments_bytes * comm_.size());
   log::info(
       "rehearsed: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
       "MiB",
       outlook->increments, outlook->increment_s, total, report::duration(total / comm_.size()), comm_.size(),
-      comm_.size() == 1 ? "" : "s",
-      (memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0)) / 1048576);
+      comm_.size() == 1 ? "" : "s", bytes / 1048576);
   const std::string of_space = outlook->error > 0 ? fmt::format("{:.2g} %", 100 * outlook->error) : "unknown";
   log::info("expected error {:.2g} %: of space {}, of other sources {:.2g} %",
             100 * std::hypot(outlook->error, outlook->other_error), of_space, 100 * outlook->other_error);
