@@ -55,6 +55,7 @@ void open_file(const std::filesystem::path& path, bool append) {
   if (log.file == nullptr) {
     throw StorageError(fmt::format("{}: cannot be opened for writing: {}", path.string(), std::strerror(errno)));
   }
+  for (const std::string& warning : log.warnings) put(log.file.get(), "warning: " + warning);
 }
 
 void close_file() {

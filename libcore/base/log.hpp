@@ -15,7 +15,8 @@ enum class Level { quiet, normal, verbose };
 
 /// Sets what reaches the terminal; run.log gets everything. speaks: true on the root rank alone.
 void start(bool speaks, Level level);
-/// From now on everything also goes to that file; append keeps what stands there. StorageError. Local.
+/// From now on everything also goes to that file, after the warnings so far; append keeps what stands there.
+/// StorageError. Local.
 void open_file(const std::filesystem::path& path, bool append);
 void close_file();
 

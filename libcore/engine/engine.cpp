@@ -129,9 +129,9 @@ void Engine::print_outlook() {
   const auto outlook = space_estimate_.look_ahead(process_, plan, seconds_of_rehearsal);
   if (!outlook) return;
   const auto nodes = static_cast<Real>(process_.mesh().total_nodes());
-  const Real estimates = plan.is_steady() || !process_.solves_again() ? 1 : 2;
+  const int estimates = plan.is_steady() || !process_.solves_again() ? 1 : 2;
   const Real outputs = plan.is_steady() ? 1 : outlook->increments / static_cast<Real>(settings_.output_every) + 2;
-  const Real total = spent + outlook->total_s() + estimates * (outlook->making_s + outlook->coarse_s) +
+  const Real total = spent + outlook->total_s(estimates) +
                      outputs * (output_s * comm_.size() + output_s_per_node * nodes) +
                      (plan.is_steady() ? 0 : checkpoint_s) * comm_.size();
   const Real bytes = memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0) +
@@ -444,7 +444,11 @@ ErrorBudget Engine::error_budget() {
   const std::vector<Component*> components = process_.components();
   const bool remeshes = std::any_of(components.begin(), components.end(),
                                     [](const Component* component) { return component->name() == "remeshing"; });
-  if (const auto share = space_estimate_.share(remeshes)) budget.add(*share);
+  if (const auto share = space_estimate_.share(remeshes)) {
+    budget.add(*share);
+  } else if (space_estimate_.is_asked_for() && !process_.results().empty()) {
+    budget.add_unknown("space", "no coarser mesh could be made on which the scene can be solved");
+  }
   return budget;
 }
 
@@ -512,6 +516,7 @@ void Engine::write_summary(const std::string& status, int code, const ErrorBudge
   if (!budget.empty()) {
     summary["accuracy"]["estimated_error"] = budget.total();
     summary["accuracy"]["error_budget"] = budget.json();
+    if (const auto unknown = budget.unknown(); !unknown.empty()) summary["accuracy"]["unknown_errors"] = unknown;
   }
   summary["status"] = status;
   summary["exit_code"] = code;

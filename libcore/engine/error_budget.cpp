@@ -32,13 +32,21 @@ Real ErrorBudget::total() const {
 
 std::vector<std::string> ErrorBudget::lines() const {
   if (shares_.empty()) return {};
-  std::vector<std::string> lines = {fmt::format("estimated error {:.2g} %", 100 * total())};
+  const char* least = unknown_.empty() ? "" : "at least ";
+  std::vector<std::string> lines = {fmt::format("estimated error {}{:.2g} %", least, 100 * total())};
+  for (const auto& [source, why] : unknown_) lines.push_back(fmt::format("  {:<12}  unknown  {}", source, why));
   for (const ErrorShare& share : shares_) {
     lines.push_back(fmt::format("  {:<12} {:>8.2g} %  {}", share.source, 100 * share.relative, share.basis));
   }
   const auto first = std::find_if(shares_.begin(), shares_.end(), [](const ErrorShare& s) { return !s.knob.empty(); });
   if (first != shares_.end() && first->relative > 0) lines.push_back(advice(*first));
   return lines;
+}
+
+std::vector<std::string> ErrorBudget::unknown() const {
+  std::vector<std::string> sources;
+  for (const auto& [source, why] : unknown_) sources.push_back(source);
+  return sources;
 }
 
 nlohmann::json ErrorBudget::json() const {

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/types.hpp"
@@ -26,7 +27,12 @@ class ErrorBudget {
   /// Shares that are not finite are a Defect: a source that cannot be estimated is left out.
   void add(ErrorShare share);
 
+  /// A source that should be known and is not: what is estimated is the least then. why: "no coarser mesh ...".
+  void add_unknown(const std::string& source, const std::string& why) { unknown_.emplace_back(source, why); }
+
   bool empty() const noexcept { return shares_.empty(); }
+  /// Sources that are not known.
+  std::vector<std::string> unknown() const;
   /// From the largest to the smallest.
   const std::vector<ErrorShare>& shares() const noexcept { return shares_; }
   /// The root of the sum of squares: what sources that know nothing of each other leave together. 0 if there are none.
@@ -38,6 +44,7 @@ class ErrorBudget {
 
  private:
   std::vector<ErrorShare> shares_;
+  std::vector<std::pair<std::string, std::string>> unknown_;  ///< source, why
 };
 
 }  // namespace malleus

@@ -31,6 +31,8 @@ struct Outlook {
   bool solves = false;   ///< linear systems
   Real other_error = 0;  ///< relative: of the sources other than space
   Real total_s() const { return first_s + (increments - 1) * increment_s; }
+  /// With estimates of the error of space, of which a run makes one or two.
+  Real total_s(int estimates) const { return total_s() + estimates * (making_s + coarse_s); }
 };
 
 /// Repeats increments of a process on coarser meshes. Collective throughout.

@@ -42,6 +42,8 @@ class Filling(unittest.TestCase):
         self.assertAlmostEqual(row["flow_gate_m3_s"] / (U * H), 1, 5)
         thin = [w for w in summary(output)["warnings"] if "elements across" in w]
         self.assertEqual(bool(thin), across < 4)
+        told = [line for line in (output / "run.log").read_text().splitlines() if line.startswith("warning: ")]
+        self.assertEqual(any("elements across" in line for line in told), across < 4)
         drop = probe(output, "first", "pressure")[0] - probe(output, "second", "pressure")[0]
         self.assertLess(abs(drop / (SLOPE * 5 * H) - 1), tolerance)
 

@@ -43,5 +43,14 @@ TEST(ErrorBudget, RefusesWhatIsNoSize) {
   EXPECT_THROW(budget.add({"space", -1, "", "", 0.5, 1}), Defect);
 }
 
+TEST(ErrorBudget, WhatIsUnknownMakesTheRestALeast) {
+  ErrorBudget budget = two_sources();
+  budget.add_unknown("front", "nothing told it");
+  EXPECT_NE(budget.lines()[0].find("at least"), std::string::npos);
+  EXPECT_NE(budget.lines()[1].find("front"), std::string::npos);
+  EXPECT_EQ(budget.unknown(), std::vector<std::string>{"front"});
+  EXPECT_EQ(budget.total(), two_sources().total());
+}
+
 }  // namespace
 }  // namespace malleus
