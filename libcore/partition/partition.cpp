@@ -24,8 +24,10 @@ namespace {
 /// then move whole parts, and the borders that they leave are long.
 constexpr Real start_anew_from = 0.5;
 constexpr int levelling_rounds = 16;
-constexpr int levelling_patience = 5;        ///< rounds without a better partition after which it ends
-constexpr Real levelling_tolerance = 0.004;  ///< of the loads about the moved targets
+constexpr int levelling_patience = 5;  ///< rounds without a better partition after which it ends
+/// Of the loads about the moved targets: two elements, within these bounds.
+constexpr Real least_levelling_tolerance = 0.0015;
+constexpr Real largest_levelling_tolerance = 0.004;
 /// Mesh edges that are cut with a face between elements, measured on refined partitions of tetrahedral meshes.
 constexpr Real mesh_edges_per_face = 2.5;
 
@@ -240,6 +242,7 @@ class Planner {
     if (architecture_.has_equal_links() && architecture_.has_equal_speeds()) return best;
     const Real total = std::accumulate(targets_.begin(), targets_.end(), Real{0});
     std::vector<Real> targets = targets_;
+    const Real tolerance = levelling_tolerance();
     Candidate current = best;
     int since_best = 0;
     for (int round = 0; round < levelling_rounds && since_best < levelling_patience; ++round) {
@@ -248,9 +251,9 @@ class Planner {
       parts.resize(static_cast<std::size_t>(graph_.vertices()));
       graph_.halo.update_copies(std::span<std::int32_t>(parts), 1);
       PairRefiner refiner(comm_, graph_, architecture_, std::move(parts), targets);
-      refiner.diffuse(levelling_tolerance, 6);
-      refiner.smooth(1.3 * levelling_tolerance, {2, 3, 1, 100});
-      refiner.tidy(levelling_tolerance);
+      refiner.diffuse(tolerance, 6);
+      refiner.smooth(1.3 * tolerance, {2, 3, 1, 100});
+      refiner.tidy(tolerance);
       count_.add(refiner.count());
       current.parts = std::move(refiner).take_parts();
       current.parts.resize(static_cast<std::size_t>(graph_.owned()));
@@ -261,6 +264,12 @@ class Planner {
       since_best = 0;
     }
     return best;
+  }
+
+  Real levelling_tolerance() const {
+    const Real mine = graph_.weights.empty() ? 0 : *std::max_element(graph_.weights.begin(), graph_.weights.end());
+    const Real grain = comm_.max(mine) / *std::min_element(targets_.begin(), targets_.end());
+    return std::clamp(2 * grain, least_levelling_tolerance, largest_levelling_tolerance);
   }
 
   void move_targets(const PartitionCost& cost, std::vector<Real>& targets, Real total) const {
