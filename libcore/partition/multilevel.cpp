@@ -19,8 +19,6 @@ namespace {
 constexpr GlobalId few_vertices = 20000;
 /// Of the bands: a third step from the border costs half as much time again and gains nothing that shows.
 constexpr int band_depth = 2;
-constexpr int coarse_passes = 1;
-constexpr int fine_passes = 1;
 constexpr int search_stall = 60;  ///< in the bands
 constexpr int kway_rounds = 3;
 constexpr int kway_patience = 25;
@@ -215,7 +213,8 @@ class Multilevel {
         refiner.diffuse(0.6 * tolerance, is_coarsest ? most_flow_rounds : few_flow_rounds);
         refiner.tidy(0.6 * tolerance);
       }
-      if (!is_for_one_rank(graph)) refiner.smooth(tolerance, {coarse_passes, band_depth, 1, search_stall});
+      if (!is_for_one_rank(graph))
+        refiner.smooth(tolerance, {settings_.passes, band_depth, settings_.passes, search_stall});
       count_.add(refiner.count());
       loads = refiner.loads();
       parts = owned_parts(graph, std::move(refiner).take_parts());
@@ -236,7 +235,7 @@ class Multilevel {
   std::vector<int> refine_finest(const WorkGraph& graph, std::vector<int> parts, int flow_rounds) const {
     PairRefiner refiner(comm_, graph, architecture_, with_copies(graph, std::move(parts)), targets_);
     refiner.diffuse(0.9 * settings_.tolerance, flow_rounds);
-    refiner.smooth(settings_.tolerance, {fine_passes, band_depth, 1, search_stall});
+    refiner.smooth(settings_.tolerance, {settings_.passes, band_depth, settings_.passes, search_stall});
     for (int sweep = 0; sweep < 3 && refiner.tidy(settings_.tolerance); ++sweep) {
       refiner.smooth(settings_.tolerance, {1, band_depth, 1, 100});
     }

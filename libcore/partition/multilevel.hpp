@@ -13,6 +13,7 @@ namespace malleus {
 struct MultilevelSettings {
   Real tolerance = 0.01;       ///< imbalance aimed at on the given graph; coarser ones have three times as much
   int vertices_per_part = 40;  ///< at which coarsening ends
+  int passes = 1;              ///< over all pairs of parts, and of the search in each of their bands
 };
 
 /// A way to divide a graph from scratch.

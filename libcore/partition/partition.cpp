@@ -23,6 +23,11 @@ namespace {
 /// Above this imbalance of the present partition a new one is made as well, and the better of the two taken: flows
 /// then move whole parts, and the borders that they leave are long.
 constexpr Real start_anew_from = 0.5;
+/// What a new one must gain over the repaired one, moves counted: differences below mean nothing, and moves cost more
+/// than their bytes.
+constexpr Real anew_gain = 0.005;
+/// Flows leave longer borders than a start of its own kind does: they are refined more.
+constexpr int repair_passes = 2;
 constexpr int levelling_rounds = 16;
 constexpr int levelling_patience = 5;  ///< rounds without a better partition after which it ends
 /// Of the loads about the moved targets: two elements, within these bounds.
@@ -159,7 +164,9 @@ class Planner {
   }
 
   std::vector<int> refine(std::vector<int> parts) {
-    return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, multilevel_settings(), count_);
+    MultilevelSettings settings = multilevel_settings();
+    settings.passes = repair_passes;
+    return refine_multilevel(comm_, graph_, architecture_, std::move(parts), targets_, settings, count_);
   }
 
   StartMaker start_maker(PartitionStart start) const {
@@ -221,7 +228,7 @@ class Planner {
     if (present.cost.imbalance > start_anew_from) {
       Candidate other = anew();
       finish(present, other);
-      if (predicted(other) < predicted(best)) best = std::move(other);
+      if (predicted(other) < predicted(best) - anew_gain) best = std::move(other);
     }
     return best;
   }
