@@ -1,7 +1,10 @@
 #include "forge/pair_search.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <optional>
 
 #include "base/error.hpp"
 #include "parallel/sparse_exchange.hpp"
@@ -14,6 +17,10 @@ namespace {
 constexpr Real facing_cosine = 0.1;
 /// A node beyond the rim of the master by more than this share of the facet's size does not meet it.
 constexpr Real overhang = 0.02;
+/// Nodes outside a facet by less than this share of its size are in its plane.
+constexpr Real flush = 1e-6;
+/// Squares of distances above this ratio are equal.
+constexpr Real same_place = 1 - 1e-9;
 
 /// A slave node on its way to a rank that may have its master facet.
 struct Question {
@@ -22,8 +29,13 @@ struct Question {
   std::array<Real, 3> normal;
 };
 
+/// What a rank's facets are to a slave node: the one it meets, and the nearest of all, facing it or not.
 struct Answer {
   std::int64_t index = -1;
+  bool meets = false;
+  Real nearest_squared_distance = 0;  ///< of all facets
+  Real nearest_side = 0;              ///< m; > 0: outside that facet
+  Real size = 0;                      ///< m, of the facet that it meets
   Real squared_distance = 0;
   Real gap = 0;
   std::array<Real, 3> normal{};
@@ -62,23 +74,35 @@ class MasterFacets {
 
   Bounds bounds() const { return tree_.bounds(); }
 
-  /// index of the answer is -1 where no facet that faces the node is within reach.
+  /// index of the answer is -1 where no facet is within reach.
   Answer answer(const Question& question, Real reach) const {
     const Vector point = to_vector(question.point);
-    const Vector normal = to_vector(question.normal);
+    const ClosestFacet nearest = tree_.closest(point, reach);
+    Answer answer;
+    if (nearest.facet < 0) return answer;
+    answer.index = question.index;
+    answer.nearest_squared_distance = nearest.at.squared_distance;
+    answer.nearest_side = (point - nearest.at.point).dot(normals_[static_cast<std::size_t>(nearest.facet)]);
+    meet(point, to_vector(question.normal), reach, answer);
+    return answer;
+  }
+
+ private:
+  /// The facet that the node meets: the closest that faces it, where the node is not beyond the rim.
+  void meet(const Vector& point, const Vector& normal, Real reach, Answer& answer) const {
     const ClosestFacet closest = tree_.closest(
         point, reach, [&](LocalId f) { return normals_[static_cast<std::size_t>(f)].dot(normal) < -facing_cosine; });
-    Answer answer;
-    if (closest.facet < 0) return answer;
+    if (closest.facet < 0) return;
     const Vector smoothed = smoothed_normal(closest);
     const Vector offset = point - closest.at.point;
     answer.gap = offset.dot(smoothed);
     const Real beside = (offset - answer.gap * smoothed).norm();
     const Bounds box = set_.bounds(closest.facet);
-    if (beside > overhang * (box.high - box.low).norm() + std::abs(answer.gap)) return answer;
+    answer.size = (box.high - box.low).norm();
+    if (beside > overhang * answer.size + std::abs(answer.gap)) return;
     const Mesh& mesh = surface_.mesh();
     const LocalId facet = facets_[static_cast<std::size_t>(closest.facet)];
-    answer.index = question.index;
+    answer.meets = true;
     answer.squared_distance = closest.at.squared_distance;
     answer.normal = to_array(smoothed);
     answer.weights = closest.at.weights;
@@ -86,10 +110,8 @@ class MasterFacets {
     for (std::size_t k = 0; k < static_cast<std::size_t>(mesh.dim); ++k) {
       answer.masters[k] = mesh.global_node(mesh.nodes_of_facet(facet)[k]);
     }
-    return answer;
   }
 
- private:
   Vector smoothed_normal(const ClosestFacet& closest) const {
     Vector normal = Vector::Zero();
     for (int k = 0; k < set_.dim; ++k) {
@@ -104,6 +126,32 @@ class MasterFacets {
   FacetSet set_;
   std::vector<Vector> normals_;
   FacetTree tree_;
+};
+
+/// Of the answers of all ranks, whatever their order.
+struct BestAnswer {
+  std::optional<Answer> met;  ///< the closest that the node meets
+  Real nearest_squared_distance = std::numeric_limits<Real>::infinity();
+  Real nearest_side = 0;
+
+  void take(const Answer& answer) {
+    if (answer.meets && (!met || answer.squared_distance < met->squared_distance)) met = answer;
+    const bool is_nearer = answer.nearest_squared_distance < nearest_squared_distance;
+    if (is_nearer ||
+        (answer.nearest_squared_distance == nearest_squared_distance && answer.nearest_side > nearest_side)) {
+      nearest_squared_distance = answer.nearest_squared_distance;
+      nearest_side = answer.nearest_side;
+    }
+  }
+
+  /// A node outside a facet that is nearer than the one which it seems to have gone through went round the rim, where
+  /// it is beyond the rim or deep; nodes of flush sides are neither.
+  bool meets() const {
+    if (!met) return false;
+    const bool is_outside = met->gap < 0 && nearest_side > flush * met->size &&
+                            nearest_squared_distance < same_place * met->squared_distance;
+    return !is_outside || std::max(nearest_side, -met->gap) <= overhang * met->size;
+  }
 };
 
 /// The boxes of all ranks' master facets, in rank order.
@@ -144,15 +192,14 @@ std::vector<NodeFacetPair> find_pairs(const Communicator& comm, const FreeSurfac
       if (answer.index >= 0) answers[rank].push_back(answer);
     }
   }
-  std::map<std::int64_t, Answer> best;
+  std::map<std::int64_t, BestAnswer> best;
   for (const auto& [rank, given] : sparse_exchange(comm, answers)) {
-    for (const Answer& answer : given) {
-      const auto [entry, is_new] = best.try_emplace(answer.index, answer);
-      if (!is_new && answer.squared_distance < entry->second.squared_distance) entry->second = answer;
-    }
+    for (const Answer& answer : given) best[answer.index].take(answer);
   }
   std::vector<NodeFacetPair> pairs;
-  for (const auto& [index, answer] : best) {
+  for (const auto& [index, of_all_ranks] : best) {
+    if (!of_all_ranks.meets()) continue;
+    const Answer& answer = *of_all_ranks.met;
     const auto place = static_cast<std::size_t>(index);
     pairs.push_back(
         {surface.nodes()[place], place, answer.masters, answer.weights, to_vector(answer.normal), answer.gap});

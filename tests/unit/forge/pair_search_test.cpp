@@ -121,5 +121,34 @@ TEST(PairSearch, PenetrationIsANegativeGap) {
   for (const NodeFacetPair& pair : search(mesh, 0.1)) EXPECT_NEAR(pair.gap, -0.01, 1e-12);
 }
 
+/// The upper block overlaps the lower by 0.01 and stands out over its side x = 1 by 0.1.
+Mesh standing_out(Layout layout) {
+  Mesh mesh =
+      test::two_boxes(world(), {.cells = {3, 3, 3}}, {.cells = {4, 4, 4}, .low = {0.1, 0.99, 0}, .high = {1.1, 2, 1}});
+  // What stands out is folded down beside the lower block, 0.03 away from it.
+  for (LocalId n = 0; n < mesh.nodes(); ++n) {
+    if (mesh.point(n)[0] > 1.05 && mesh.point(n)[1] < 1) {
+      mesh.point(n)[0] = 1.03;
+      mesh.point(n)[1] = 0.85;
+    }
+  }
+  test::lay_out(world(), mesh, layout);
+  return mesh;
+}
+
+TEST(PairSearch, ANodeFoldedRoundTheRimDoesNotMeetTheTop) {
+  for (const Layout layout : {Layout::as_built, Layout::scattered, Layout::all_on_the_last}) {
+    const Mesh mesh = standing_out(layout);
+    const auto pairs = search(mesh, 0.2);
+    GlobalId on_top = 0;
+    for (const NodeFacetPair& pair : pairs) {
+      const bool is_top = pair.normal[1] > 0.9;
+      on_top += is_top ? 1 : 0;
+      EXPECT_NEAR(pair.gap, is_top ? -0.01 : 0.03, 1e-12);  // else the side that it is folded down to
+    }
+    EXPECT_EQ(world().sum(on_top), 20);  // x = 0.1, 0.35, 0.6, 0.85 of each row
+  }
+}
+
 }  // namespace
 }  // namespace malleus::forge
