@@ -114,18 +114,21 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP OverSubscri
         shown = self.say("scontrol", "-o", "show", "job", job)
         return " ".join(sorted({word[9:] for word in shown.split() if word.startswith("JobState=")}))
 
-    def wait_to_end(self, job, seconds):
-        """Until it is over; a job that waits to begin again may at once."""
-        limit = time.monotonic() + seconds
+    def wait_to_end(self, job, seconds, is_done=lambda: True):
+        """The state in which it ends; a job that waits to begin again may at once.
+
+        A leg that goes back to the queue is told as failed for a while: what is over without being done has to stay so."""
+        limit, over_since = time.monotonic() + seconds, None
         while time.monotonic() < limit:
             state = self.state(job)
             if "PENDING" in state:
                 self.say("scontrol", "update", f"JobId={job}", "StartTime=now")
-            elif not {"RUNNING", "SIGNALING", "COMPLETING", "REQUEUED"} & set(state.split()):
-                # A leg that goes back to the queue is told as failed for a moment.
-                time.sleep(3)
-                if self.state(job) == state:
-                    return state
+            if {"PENDING", "RUNNING", "SIGNALING", "COMPLETING", "REQUEUED"} & set(state.split()):
+                over_since = None
+            elif over_since is None:
+                over_since = time.monotonic()
+            elif time.monotonic() - over_since > (3 if is_done() else 60):
+                return state
             time.sleep(0.5)
         raise AssertionError(f"job {job} is {self.state(job)} after {seconds} s")
 
