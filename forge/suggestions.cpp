@@ -16,7 +16,7 @@ constexpr Real as_good_as_rigid = 50;
 constexpr Real as_good_as_weightless = 1e-3;
 
 /// Distance to the nearest face of a tool where it stands, m.
-Real distance_to(const Tool& tool, const std::array<Real, 3>& place) {
+Real distance_to(const Tool& tool, const Position& place) {
   std::vector<SurfaceContact> faces;
   tool.contacts_at_start(to_vector(place.data(), 3), std::numeric_limits<Real>::infinity(), faces);
   Real distance = std::numeric_limits<Real>::infinity();
@@ -36,7 +36,7 @@ std::optional<SceneParts> parts_of(const Scene& scene, const ForgeCase& forge_ca
     const ToolMotion& motion = tool.motion();
     if (motion.rotation.squaredNorm() > 0) return std::nullopt;
     parts->vectors.push_back({motion.direction[0], motion.direction[1], motion.direction[2]});
-    parts->scalars.emplace_back([&tool](const std::array<Real, 3>& place) { return distance_to(tool, place); });
+    parts->scalars.emplace_back([&tool](const Position& place) { return distance_to(tool, place); });
   }
   return parts;
 }

@@ -192,8 +192,7 @@ Outcome Front::advance(const Increment& increment) {
       roll_back();
       return Outcome::fail(
           fmt::format("the front would need {:.1g} substeps of {:g} elements in {:g} s; shorten [time] step, and look "
-                      "at the units of "
-                      "gates and viscosities",
+                      "at the units of gates and viscosities",
                       wanted, scene_.settings.front.cfl, left));
     }
     const int parts = static_cast<int>(std::max(wanted, 1.0));

@@ -104,7 +104,7 @@ std::optional<SceneParts> parts_of(const Scene& scene) {
   if (std::ranges::any_of(settings.vents, [&](const auto& vent) { return varies(vent.pressure); })) return std::nullopt;
   for (const InitialShape& shape : settings.shapes) {
     parts->scalars.emplace_back(
-        [&shape, dim = scene.mesh.dim](const std::array<Real, 3>& place) { return shape.signed_distance(place, dim); });
+        [&shape, dim = scene.mesh.dim](const Position& place) { return shape.signed_distance(place, dim); });
   }
   return parts;
 }

@@ -71,7 +71,7 @@ void add_options(CLI::App& app, PartitionCommand& c) {
                  "refined (default), curve, strips (the paper's algorithm), or keep: the partition of --from as it is")
       ->check(CLI::IsMember({"refined", "curve", "strips", "keep"}));
   app.add_option("--start", c.start,
-                 "What a new partition is refined from: best (default: of the next three that of least cut), curve, "
+                 "What a new partition is refined from: best (default: of the next four that of least cut), curve, "
                  "coordinate, inertial, growth, or scotch (PT-Scotch)")
       ->check(CLI::IsMember({"best", "curve", "coordinate", "inertial", "growth", "scotch"}));
   app.add_option("--release", c.release,

@@ -33,8 +33,8 @@ nlohmann::json to_json(const Communicator& comm, const DistributedRemeshReport& 
   Real total = 0;
   for (const auto* list : {&phases, &report.phases}) {
     for (const RemeshPhase& phase : *list) {
-      wall[phase.name] = phase.seconds;
-      total += phase.seconds;
+      wall[phase.name] = phase.wall_s;
+      total += phase.wall_s;
     }
   }
   wall["total"] = total;

@@ -2,14 +2,11 @@
 
 #include <algorithm>
 
+#include "base/index.hpp"
 #include "fem/facet.hpp"
 
 namespace malleus {
 namespace {
-
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 Position between(const std::vector<Position>& corners) {
   Position mean = {};
@@ -28,7 +25,7 @@ void measure(const Mesh& mesh, LocalId facet, Real length, BoundaryFacet& found)
 
 }  // namespace
 
-Frame frame_of(const Communicator& comm, const Mesh& mesh) {
+BoundingFrame bounding_frame(const Communicator& comm, const Mesh& mesh) {
   std::array<Real, 6> extremes;
   extremes.fill(-1e300);
   for (LocalId node = 0; node < mesh.nodes(); ++node) {
@@ -38,7 +35,7 @@ Frame frame_of(const Communicator& comm, const Mesh& mesh) {
     }
   }
   comm.max_in_place(extremes);
-  Frame frame;
+  BoundingFrame frame;
   for (int c = 0; c < mesh.dim; ++c) {
     frame.middle[index(c)] = (extremes[index(c)] - extremes[index(c + 3)]) / 2;
     frame.half[index(c)] = (extremes[index(c)] + extremes[index(c + 3)]) / 2;
@@ -47,7 +44,7 @@ Frame frame_of(const Communicator& comm, const Mesh& mesh) {
   return frame;
 }
 
-BoundaryFacet boundary_facet(const Mesh& mesh, LocalId facet, const Frame& frame) {
+BoundaryFacet boundary_facet(const Mesh& mesh, LocalId facet, const BoundingFrame& frame) {
   BoundaryFacet found;
   mesh.dim == 3 ? measure<3>(mesh, facet, frame.length, found) : measure<2>(mesh, facet, frame.length, found);
   std::vector<Position> corners;

@@ -14,7 +14,7 @@
 namespace malleus {
 
 /// The box around the scene, and half its largest edge as the unit of length.
-struct Frame {
+struct BoundingFrame {
   Position middle = {};  ///< m
   Position half = {};    ///< edges' halves, m
   Real length = 0;       ///< m
@@ -27,7 +27,7 @@ struct Frame {
 };
 
 /// Around all nodes. Collective.
-Frame frame_of(const Communicator& comm, const Mesh& mesh);
+BoundingFrame bounding_frame(const Communicator& comm, const Mesh& mesh);
 
 /// A facet of the boundary in the units of the frame, with a quadrature exact for cubics (2D: Simpson's).
 struct BoundaryFacet {
@@ -37,10 +37,10 @@ struct BoundaryFacet {
 };
 
 /// Local.
-BoundaryFacet boundary_facet(const Mesh& mesh, LocalId facet, const Frame& frame);
+BoundaryFacet boundary_facet(const Mesh& mesh, LocalId facet, const BoundingFrame& frame);
 
 /// A facet with its class: that of its group within its region.
-struct Visit {
+struct ClassedFacet {
   BoundaryFacet facet;
   std::size_t kind = 0;
   bool is_symmetry = false;
@@ -53,14 +53,14 @@ inline std::size_t classes_of(const Mesh& mesh, const SceneParts& parts) {
 
 /// Exterior facets of this rank. Local.
 template <class Work>
-void for_each_boundary_facet(const Mesh& mesh, const SceneParts& parts, const Frame& frame, Work&& work) {
+void for_each_boundary_facet(const Mesh& mesh, const SceneParts& parts, const BoundingFrame& frame, Work&& work) {
   for (LocalId facet = 0; facet < mesh.exterior_facets; ++facet) {
     const auto group = static_cast<std::size_t>(mesh.facet_group[static_cast<std::size_t>(facet)] + 1);
     const auto element = static_cast<std::size_t>(mesh.facet_element[static_cast<std::size_t>(facet)]);
     const auto kind = static_cast<std::size_t>(parts.class_of_group[group]);
     const auto region = static_cast<std::size_t>(mesh.element_region[element]);
-    work(Visit{boundary_facet(mesh, facet, frame), region * parts.is_symmetry_plane.size() + kind,
-               parts.is_symmetry_plane[kind] != 0});
+    work(ClassedFacet{boundary_facet(mesh, facet, frame), region * parts.is_symmetry_plane.size() + kind,
+                      parts.is_symmetry_plane[kind] != 0});
   }
 }
 

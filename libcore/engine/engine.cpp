@@ -129,18 +129,15 @@ void Engine::print_outlook() {
   const auto outlook = space_estimate_.look_ahead(process_, plan, seconds_of_rehearsal);
   if (!outlook) return;
   const auto nodes = static_cast<Real>(process_.mesh().total_nodes());
-  const int estimates = plan.is_steady() || !process_.solves_again() ? 1 : 2;
   const Real outputs = plan.is_steady() ? 1 : outlook->increments / static_cast<Real>(settings_.output_every) + 2;
-  const Real total = spent + outlook->total_s(estimates) +
+  const Real total = spent + outlook->total_s(estimates_of_run(process_, plan)) +
                      outputs * (output_s * comm_.size() + output_s_per_node * nodes) +
                      (plan.is_steady() ? 0 : checkpoint_s) * comm_.size();
   const Real bytes = memory + (outlook->solves ? solver_bytes(process_.mesh().dim, nodes, comm_.size()) : 0) +
                      (plan.is_steady() ? 0 : increments_bytes * comm_.size());
-  log::info(
-      "rehearsed: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} "
-      "MiB",
-      outlook->increments, outlook->increment_s, total, report::duration(total / comm_.size()), comm_.size(),
-      comm_.size() == 1 ? "" : "s", bytes / 1048576);
+  log::info("rehearsed: {} increments of {:.3g} s, {:.3g} s processor time in all, {} on {} rank{}; {:.0f} MiB",
+            outlook->increments, outlook->increment_s, total, report::duration(total / comm_.size()), comm_.size(),
+            comm_.size() == 1 ? "" : "s", bytes / 1048576);
   const std::string of_space = outlook->error > 0 ? fmt::format("{:.2g} %", 100 * outlook->error) : "unknown";
   log::info("expected error {:.2g} %: of space {}, of other sources {:.2g} %",
             100 * std::hypot(outlook->error, outlook->other_error), of_space, 100 * outlook->other_error);

@@ -52,15 +52,15 @@ int leave_with_defect(const Communicator& guard, const char* message) {
 
 }  // namespace
 
-int run_guarded(int argc, char** argv, const Program& program, StartPetsc* starts_petsc) {
+int run_guarded(int argc, char** argv, const Program& program, StartPetsc* start_petsc) {
   const std::vector<std::string> words(argv + 1, argv + argc);
-  const auto separator = starts_petsc != nullptr ? std::find(words.begin(), words.end(), "--") : words.end();
+  const auto separator = start_petsc != nullptr ? std::find(words.begin(), words.end(), "--") : words.end();
   const std::vector<std::string> arguments(words.begin(), separator);
   const std::vector<std::string> petsc_options(separator == words.end() ? separator : separator + 1, words.end());
   int own_argc = 1;
   Session session(own_argc, argv);
   std::shared_ptr<PetscSession> petsc;
-  if (starts_petsc != nullptr) petsc = starts_petsc(argv[0], petsc_options);
+  if (start_petsc != nullptr) petsc = start_petsc(argv[0], petsc_options);
   const Communicator guard(session.world().raw());
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more is an error that write() returns
   std::signal(SIGPIPE, SIG_IGN);  // a terminal or a reader that has gone ends no run

@@ -21,6 +21,6 @@ using StartPetsc = std::shared_ptr<PetscSession>(const char* program, const std:
 /// and returns its exit code. An Error that all ranks raise alike is printed once, by the root, as "error: ..."; one
 /// that a single rank met ends all ranks with its message and code. A Defect, or any foreign exception, is printed with
 /// its rank and ends all ranks with exit code 1.
-int run_guarded(int argc, char** argv, const Program& program, StartPetsc* starts_petsc = nullptr);
+int run_guarded(int argc, char** argv, const Program& program, StartPetsc* start_petsc = nullptr);
 
 }  // namespace malleus

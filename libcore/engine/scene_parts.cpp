@@ -19,11 +19,9 @@ bool add_conditions(const BoundarySettings& boundary, SceneParts& parts) {
 
 }  // namespace
 
-int SceneParts::add_class(int group, bool is_symmetry) {
-  const int added = static_cast<int>(is_symmetry_plane.size());
+void SceneParts::add_class(int group, bool is_symmetry) {
+  class_of_group[static_cast<std::size_t>(group + 1)] = static_cast<int>(is_symmetry_plane.size());
   is_symmetry_plane.push_back(is_symmetry ? 1 : 0);
-  class_of_group[static_cast<std::size_t>(group + 1)] = added;
-  return added;
 }
 
 bool SceneParts::add_vector(const ExpressionVector& components) {

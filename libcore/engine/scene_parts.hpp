@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/position.hpp"
 #include "case/common_sections.hpp"
 #include "mesh/mesh.hpp"
 
@@ -14,7 +15,7 @@ namespace malleus {
 
 /// To be filled by the program that knows the scene.
 struct SceneParts {
-  using ScalarOfPlace = std::function<Real(const std::array<Real, 3>&)>;
+  using ScalarOfPlace = std::function<Real(const Position&)>;
 
   /// [group + 1] parts of the boundary with the same number have the same conditions; 0, 1, ...
   std::vector<int> class_of_group;
@@ -22,8 +23,8 @@ struct SceneParts {
   std::vector<ScalarOfPlace> scalars;        ///< m: distances to tools, level sets at the start
   std::vector<std::array<Real, 3>> vectors;  ///< that hold everywhere; of those that change in time what is not 0
 
-  /// A class of its own for a group of the mesh; its number.
-  int add_class(int group, bool is_symmetry);
+  /// A class of its own for a group of the mesh.
+  void add_class(int group, bool is_symmetry);
   /// False where a component depends on the position.
   bool add_vector(const ExpressionVector& components);
 };

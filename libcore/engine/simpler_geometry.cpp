@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/index.hpp"
 #include "engine/boundary_shape.hpp"
 
 namespace malleus {
@@ -18,10 +19,6 @@ constexpr Real rounding = 1e-9;
 constexpr std::size_t odd_moments = 7;
 constexpr std::size_t turn_moments = 7;
 constexpr int sampled_places = 48;
-
-std::size_t index(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Those that vanish where a boundary is its own mirror image about u = 0.
 std::array<Real, odd_moments> odd_in(Real u, Real v, Real w) {
@@ -38,29 +35,30 @@ struct BoundarySums {
   explicit BoundarySums(std::size_t classes) : odd(classes * 3 * odd_moments, 0), areas(classes, 0) {}
 
   std::size_t classes() const { return areas.size(); }
-  void add(const Visit& visit, const Frame& frame);
+  void add(const ClassedFacet& classed, const BoundingFrame& frame);
 };
 
-void BoundarySums::add(const Visit& visit, const Frame& frame) {
-  areas[visit.kind] += visit.facet.area;
+void BoundarySums::add(const ClassedFacet& classed, const BoundingFrame& frame) {
+  areas[classed.kind] += classed.facet.area;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Real* sums = odd.data() + (visit.kind * 3 + axis) * odd_moments;
-    for (const auto& [at, weight] : visit.facet.points) {
+    Real* sums = odd.data() + (classed.kind * 3 + axis) * odd_moments;
+    for (const auto& [at, weight] : classed.facet.points) {
       const auto odds = odd_in(at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]);
       for (std::size_t i = 0; i < odd_moments; ++i) sums[i] += weight * odds[i];
     }
-    const Real along = std::abs(visit.facet.normal[axis]);
-    const Real place = visit.facet.points[0].first[axis];
+    const Real along = std::abs(classed.facet.normal[axis]);
+    const Real place = classed.facet.points[0].first[axis];
     const bool is_end =
-        visit.is_symmetry && along > 1 - flat && std::abs(std::abs(place) - frame.half[axis] / frame.length) < flat;
+        classed.is_symmetry && along > 1 - flat && std::abs(std::abs(place) - frame.half[axis] / frame.length) < flat;
     if (is_end) is_symmetric_end[axis][place > 0 ? 1 : 0] = true;
-    is_prism[axis] = is_prism[axis] && (is_end || (!visit.is_symmetry && along < flat));
+    is_prism[axis] = is_prism[axis] && (is_end || (!classed.is_symmetry && along < flat));
   }
 }
 
-BoundarySums sums_of_boundary(const Communicator& comm, const Mesh& mesh, const SceneParts& parts, const Frame& frame) {
+BoundarySums sums_of_boundary(const Communicator& comm, const Mesh& mesh, const SceneParts& parts,
+                              const BoundingFrame& frame) {
   BoundarySums sums(classes_of(mesh, parts));
-  for_each_boundary_facet(mesh, parts, frame, [&](const Visit& visit) { sums.add(visit, frame); });
+  for_each_boundary_facet(mesh, parts, frame, [&](const ClassedFacet& classed) { sums.add(classed, frame); });
   comm.sum_in_place(sums.odd);
   comm.sum_in_place(sums.areas);
   for (bool& is_prism : sums.is_prism) is_prism = comm.all(is_prism);
@@ -81,7 +79,7 @@ Real spread(int number, int base) {
   return value;
 }
 
-std::vector<Position> places_around(const Frame& frame, int dim) {
+std::vector<Position> places_around(const BoundingFrame& frame, int dim) {
   std::vector<Position> places;
   const std::array<int, 3> bases = {2, 3, 5};
   for (int i = 1; i <= sampled_places; ++i) {
@@ -94,7 +92,7 @@ std::vector<Position> places_around(const Frame& frame, int dim) {
   return places;
 }
 
-bool are_alike(const SceneParts& parts, const Frame& frame, int dim,
+bool are_alike(const SceneParts& parts, const BoundingFrame& frame, int dim,
                const std::function<Position(const Position&)>& moved) {
   const auto is_alike = [&](const SceneParts::ScalarOfPlace& scalar, const Position& place) {
     const Real here = scalar(place);
@@ -109,7 +107,8 @@ bool are_alike(const SceneParts& parts, const Frame& frame, int dim,
   return true;
 }
 
-bool is_mirrored(const SceneParts& parts, const BoundarySums& sums, const Frame& frame, int dim, std::size_t axis) {
+bool is_mirrored(const SceneParts& parts, const BoundarySums& sums, const BoundingFrame& frame, int dim,
+                 std::size_t axis) {
   for (const auto& vector : parts.vectors) {
     if (vector[axis] != 0) return false;
   }
@@ -126,10 +125,10 @@ bool is_mirrored(const SceneParts& parts, const BoundarySums& sums, const Frame&
 }
 
 /// Of a facet at v, w from a line: first and second moments, the turn of the normal about the line, the area.
-void add_turn(const Visit& visit, const Position& line, std::size_t axis, Real* sums) {
+void add_turn(const ClassedFacet& classed, const Position& line, std::size_t axis, Real* sums) {
   const std::size_t b = (axis + 1) % 3;
   const std::size_t c = (axis + 2) % 3;
-  for (const auto& [at, weight] : visit.facet.points) {
+  for (const auto& [at, weight] : classed.facet.points) {
     const Real v = at[b] - line[b];
     const Real w = at[c] - line[c];
     sums[0] += weight * v;
@@ -138,7 +137,7 @@ void add_turn(const Visit& visit, const Position& line, std::size_t axis, Real* 
     sums[3] += weight * v * v;
     sums[4] += weight * w * w;
     const Real radius = std::hypot(v, w);
-    const Real turn = visit.facet.normal[c] * v - visit.facet.normal[b] * w;
+    const Real turn = classed.facet.normal[c] * v - classed.facet.normal[b] * w;
     if (radius > flat) sums[5] += weight * std::pow(turn / radius, 2);
     sums[6] += weight;
   }
@@ -154,13 +153,13 @@ bool is_even(const Real* moments, bool is_quarter) {
 }
 
 /// line: in the units of the frame. Collective.
-bool is_surface_of_revolution(const Communicator& comm, const Mesh& mesh, const SceneParts& parts, const Frame& frame,
-                              const Position& line, std::size_t axis, bool is_quarter) {
+bool is_surface_of_revolution(const Communicator& comm, const Mesh& mesh, const SceneParts& parts,
+                              const BoundingFrame& frame, const Position& line, std::size_t axis, bool is_quarter) {
   const std::size_t classes = classes_of(mesh, parts);
   std::vector<Real> moments(classes * turn_moments, 0);
-  for_each_boundary_facet(mesh, parts, frame, [&](const Visit& visit) {
-    const bool is_meridian = is_quarter && visit.is_symmetry && std::abs(visit.facet.normal[axis]) < flat;
-    if (!is_meridian) add_turn(visit, line, axis, moments.data() + visit.kind * turn_moments);
+  for_each_boundary_facet(mesh, parts, frame, [&](const ClassedFacet& classed) {
+    const bool is_meridian = is_quarter && classed.is_symmetry && std::abs(classed.facet.normal[axis]) < flat;
+    if (!is_meridian) add_turn(classed, line, axis, moments.data() + classed.kind * turn_moments);
   });
   comm.sum_in_place(moments);
   for (std::size_t kind = 0; kind < classes; ++kind) {
@@ -171,7 +170,7 @@ bool is_surface_of_revolution(const Communicator& comm, const Mesh& mesh, const 
 }
 
 /// Whether vectors and scalars do not change with the angle about a line.
-bool are_revolved(const SceneParts& parts, const Frame& frame, const AxisLine& line) {
+bool are_revolved(const SceneParts& parts, const BoundingFrame& frame, const AxisLine& line) {
   const std::size_t b = (line.axis + 1) % 3;
   const std::size_t c = (line.axis + 2) % 3;
   for (const auto& vector : parts.vectors) {
@@ -189,7 +188,7 @@ bool are_revolved(const SceneParts& parts, const Frame& frame, const AxisLine& l
 }
 
 /// Lines along an axis in the units of the frame: the middle one, then those where two planes of symmetry meet.
-std::vector<Position> possible_lines(const BoundarySums& sums, const Frame& frame, std::size_t axis) {
+std::vector<Position> possible_lines(const BoundarySums& sums, const BoundingFrame& frame, std::size_t axis) {
   const std::size_t b = (axis + 1) % 3;
   const std::size_t c = (axis + 2) % 3;
   std::vector<Position> lines = {Position{}};
@@ -206,7 +205,7 @@ std::vector<Position> possible_lines(const BoundarySums& sums, const Frame& fram
 }
 
 std::vector<AxisLine> find_revolutions(const Communicator& comm, const Mesh& mesh, const SceneParts& parts,
-                                       const BoundarySums& sums, const Frame& frame) {
+                                       const BoundarySums& sums, const BoundingFrame& frame) {
   std::vector<AxisLine> found;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     bool is_quarter = false;  // all lines after the first are edges of a quarter
@@ -226,7 +225,7 @@ std::vector<AxisLine> find_revolutions(const Communicator& comm, const Mesh& mes
   return found;
 }
 
-bool is_extruded(const SceneParts& parts, const BoundarySums& sums, const Frame& frame, std::size_t axis) {
+bool is_extruded(const SceneParts& parts, const BoundarySums& sums, const BoundingFrame& frame, std::size_t axis) {
   if (!sums.is_prism[axis]) return false;
   for (const auto& vector : parts.vectors) {
     if (vector[axis] != 0) return false;
@@ -243,7 +242,7 @@ constexpr std::array<const char*, 3> axis_names = {"x", "y", "z"};
 
 SimplerGeometry find_simpler_geometry(const Communicator& comm, const Mesh& mesh, Geometry geometry,
                                       const SceneParts& parts) {
-  const Frame frame = frame_of(comm, mesh);
+  const BoundingFrame frame = bounding_frame(comm, mesh);
   const BoundarySums sums = sums_of_boundary(comm, mesh, parts, frame);
   SimplerGeometry found;
   for (std::size_t c = 0; c < 3; ++c) {

@@ -14,15 +14,15 @@ namespace malleus {
 
 /// A line along one of the axes.
 struct AxisLine {
-  std::size_t axis = 0;              ///< x, y, z
-  std::array<Real, 3> through = {};  ///< m
+  std::size_t axis = 0;   ///< x, y, z
+  Position through = {};  ///< m
 };
 
 struct SimplerGeometry {
   std::array<bool, 3> is_mirrored = {};  ///< [axis] about the middle plane normal to it
   std::array<bool, 3> is_extruded = {};  ///< [axis] along it, between two planes of symmetry; 3D
   std::vector<AxisLine> revolutions;     ///< about the middle line, or where two planes of symmetry meet; 3D
-  std::array<Real, 3> middle = {};       ///< of the scene's bounds, m
+  Position middle = {};                  ///< of the scene's bounds, m
 
   /// Lines for the plan. symmetry_section: how a plane of symmetry is written.
   std::vector<std::string> suggestions(const std::string& symmetry_section) const;

@@ -177,8 +177,8 @@ std::vector<std::string> settings_for_targets(const Communicator& comm, Simulato
     outlook = trial.look_ahead(*process, plan, asked.target_time ? seconds_of_rehearsal : 0);
     if (outlook) {
       expected.increments = outlook->increments;
-      const int estimates = plan.is_steady() || !process->solves_again() ? 1 : 2;
-      outlook->increment_s = outlook->total_s(estimates) / outlook->increments / comm.size();  // wall time
+      const Real processor_s = outlook->total_s(estimates_of_run(*process, plan));
+      outlook->increment_s = processor_s / outlook->increments / comm.size();  // wall time
     }
     expected.dimension = mesh.dim;
     expected.steps_follow_sizes = process->steps_follow_sizes();

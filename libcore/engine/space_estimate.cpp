@@ -84,6 +84,10 @@ std::unique_ptr<Process> SpaceEstimate::coarser(const Process& fine, FieldStore&
   return twin;
 }
 
+int estimates_of_run(const Process& process, const RunPlan& plan) {
+  return plan.is_steady() || !process.solves_again() ? 1 : 2;
+}
+
 void SpaceEstimate::prepare(Process& process) {
   make_twins(process, true);
 }

@@ -35,6 +35,9 @@ struct Outlook {
   Real total_s(int estimates) const { return total_s() + estimates * (making_s + coarse_s); }
 };
 
+/// Estimates of the error of space that a run makes: of its start, and half-way where results change. Local.
+int estimates_of_run(const Process& process, const RunPlan& plan);
+
 /// Repeats increments of a process on coarser meshes. Collective throughout.
 class SpaceEstimate {
  public:

@@ -39,8 +39,7 @@ Choice choose_for(const AccuracySettings& asked, const Expectation& expected) {
   }
   choice.reason = fmt::format(
       "{}: the mesh as given would leave {:.2g} % in {:.3g} s; its sizes times {:.2g} and level {} should leave {:.2g} "
-      "% in "
-      "{:.3g} s",
+      "% in {:.3g} s",
       asked_for, 100 * outlook.error, expected.wall_s(), choice.size_factor,
       level_names[static_cast<std::size_t>(choice.level)], 100 * error, time);
   if (asked.target_error && error > 1.05 * *asked.target_error) choice.reason += " (the target is out of reach)";

@@ -28,20 +28,27 @@ void axes_to_transpose(std::uint32_t* x, int bits, int dim) {
   for (int i = 0; i < dim; ++i) x[i] ^= flips;
 }
 
-/// The bits of x with one zero between them (31 bits), or two (21 bits).
-std::uint64_t spread_by_one(std::uint64_t x) {
-  x = (x | (x << 16)) & 0x0000ffff0000ffffULL;
-  x = (x | (x << 8)) & 0x00ff00ff00ff00ffULL;
-  x = (x | (x << 4)) & 0x0f0f0f0f0f0f0f0fULL;
-  x = (x | (x << 2)) & 0x3333333333333333ULL;
-  return (x | (x << 1)) & 0x5555555555555555ULL;
-}
-std::uint64_t spread_by_two(std::uint64_t x) {
-  x = (x | (x << 32)) & 0x001f00000000ffffULL;
-  x = (x | (x << 16)) & 0x001f0000ff0000ffULL;
-  x = (x | (x << 8)) & 0x100f00f00f00f00fULL;
-  x = (x | (x << 4)) & 0x10c30c30c30c30c3ULL;
-  return (x | (x << 2)) & 0x1249249249249249ULL;
+/// One step of spreading bits: those of the upper half of each group move up, the mask keeps both halves.
+struct SpreadStep {
+  int shift;
+  std::uint64_t mask;
+};
+/// One zero between bits, for 31 of them.
+constexpr std::array<SpreadStep, 5> apart_by_one = {{{16, 0x0000ffff0000ffffULL},
+                                                     {8, 0x00ff00ff00ff00ffULL},
+                                                     {4, 0x0f0f0f0f0f0f0f0fULL},
+                                                     {2, 0x3333333333333333ULL},
+                                                     {1, 0x5555555555555555ULL}}};
+/// Two zeros between bits, for 21 of them.
+constexpr std::array<SpreadStep, 5> apart_by_two = {{{32, 0x001f00000000ffffULL},
+                                                     {16, 0x001f0000ff0000ffULL},
+                                                     {8, 0x100f00f00f00f00fULL},
+                                                     {4, 0x10c30c30c30c30c3ULL},
+                                                     {2, 0x1249249249249249ULL}}};
+
+std::uint64_t spread(std::uint64_t x, const std::array<SpreadStep, 5>& steps) {
+  for (const SpreadStep& step : steps) x = (x | (x << step.shift)) & step.mask;
+  return x;
 }
 
 }  // namespace
@@ -75,8 +82,10 @@ std::uint64_t hilbert_key(const Real* point, int dim, const Box& box) {
     x[axis] = static_cast<std::uint32_t>(share * cells);
   }
   axes_to_transpose(x.data(), bits, dim);
-  if (dim == 2) return (spread_by_one(x[0]) << 1) | spread_by_one(x[1]);
-  return (spread_by_two(x[0]) << 2) | (spread_by_two(x[1]) << 1) | spread_by_two(x[2]);
+  const auto& steps = dim == 2 ? apart_by_one : apart_by_two;
+  std::uint64_t key = 0;
+  for (int i = 0; i < dim; ++i) key = (key << 1) | spread(x[static_cast<std::size_t>(i)], steps);
+  return key;
 }
 
 }  // namespace malleus

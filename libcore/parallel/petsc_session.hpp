@@ -18,6 +18,7 @@ class PetscSession {
   ~PetscSession();
 };
 
+/// For run_guarded(). Collective.
 std::shared_ptr<PetscSession> start_petsc(const char* program, const std::vector<std::string>& options);
 
 }  // namespace malleus

@@ -186,20 +186,24 @@ class Planner {
     }
   }
 
+  /// The chosen start; PT-Scotch's parts are never empty, and the curve stands for it where some must be.
+  PartitionStart possible_start() const {
+    const bool has_empty = architecture_.parts() > graph_.ownership.total();
+    return options_.start == PartitionStart::scotch && has_empty ? PartitionStart::curve : options_.start;
+  }
+
   /// The chosen start, or the best of our own, refined.
   Candidate anew() {
     Candidate candidate;
-    // PT-Scotch's parts are never empty.
-    if (options_.start == PartitionStart::scotch && architecture_.parts() <= graph_.ownership.total()) {
+    if (const PartitionStart start = possible_start(); start == PartitionStart::scotch) {
       candidate.parts = refine(scotch_parts(comm_, graph_, architecture_.speed));
       candidate.made_by = "PT-Scotch and refinement";
     } else {
-      std::vector<PartitionStart> chosen = {PartitionStart::coordinate, PartitionStart::inertial, PartitionStart::curve,
-                                            PartitionStart::growth};
-      if (options_.start == PartitionStart::scotch) chosen = {PartitionStart::curve};
-      if (options_.start != PartitionStart::best && options_.start != PartitionStart::scotch) chosen = {options_.start};
+      std::vector<PartitionStart> chosen = {start};
+      if (start == PartitionStart::best)
+        chosen = {PartitionStart::coordinate, PartitionStart::inertial, PartitionStart::curve, PartitionStart::growth};
       std::vector<StartMaker> makers;
-      for (const PartitionStart start : chosen) makers.push_back(start_maker(start));
+      for (const PartitionStart one : chosen) makers.push_back(start_maker(one));
       Divided divided =
           divide_multilevel(comm_, graph_, architecture_, makers, targets_, multilevel_settings(), count_);
       candidate.parts = std::move(divided.parts);

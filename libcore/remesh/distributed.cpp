@@ -58,7 +58,7 @@ class DistributedRemesher {
     const auto is_same = [&](const RemeshPhase& known) { return known.name == name; };
     auto phase = std::find_if(report_.phases.begin(), report_.phases.end(), is_same);
     if (phase == report_.phases.end()) phase = report_.phases.insert(phase, {name});
-    phase->seconds += MPI_Wtime() - start;
+    phase->wall_s += MPI_Wtime() - start;
     phase->processor_s += static_cast<Real>(std::clock() - ticks) / CLOCKS_PER_SEC;
   }
 
@@ -84,7 +84,7 @@ class DistributedRemesher {
   void spread_over_all() {
     if (comm_.size() == 1) return;
     const PlaneCuts cuts(comm_, mesh_.dim, centroids(mesh_), predicted_work(), comm_.size());
-    std::vector<std::uint8_t> band = elements_at(comm_, mesh_, cuts, options_.band_layers);
+    std::vector<std::uint8_t> band = elements_at(mesh_, cuts, options_.band_layers);
     if (needs_remesh(band)) timed("remesh bands", [&] { remesh(std::move(band), options_.local); });
     timed("balance", [&] { deal_by(cuts); });
   }
@@ -264,7 +264,7 @@ class DistributedRemesher {
 
   /// Remeshes about the marked nodes; returns those that were held by an interface again, in the new mesh.
   std::vector<std::uint8_t> remesh_strip(const RemeshOptions& options) {
-    const std::vector<int> distance = layers_from(comm_, mesh_, get_marks(), options_.strip_layers);
+    const std::vector<int> distance = layers_from(mesh_, get_marks(), options_.strip_layers);
     std::vector<std::uint8_t> selected(index(mesh_.elements()), 0);
     for (LocalId e = 0; e < mesh_.elements(); ++e) {
       int nearest = options_.strip_layers;
@@ -317,7 +317,7 @@ class DistributedRemesher {
       *count = comm_.sum(*count);
     report_.volume_error = comm_.max(report_.volume_error);
     for (RemeshPhase& phase : report_.phases) {
-      phase.seconds = comm_.max(phase.seconds);
+      phase.wall_s = comm_.max(phase.wall_s);
       phase.processor_s = comm_.max(phase.processor_s);
     }
   }

@@ -38,13 +38,13 @@ struct MetricFit {
 /// Collective.
 MetricFit metric_fit(const Communicator& comm, const Mesh& mesh, const Metric& metric);
 
-/// Elements that a remesh would better: of quality below least_quality, or with an edge of squared metric length
-/// outside [shortest, longest]. [element] 1 or 0. Local.
+/// What an element has to be for a remesh to leave it: a little wider than what a remesh aims at.
 struct FitBounds {
-  Real least_quality = 0.6;
-  Real shortest = 0.35;
-  Real longest = 2.6;
+  Real least_quality = 0.6;  ///< mean ratio in the metric, 0..1
+  Real shortest = 0.35;      ///< of an edge, squared, in the metric
+  Real longest = 2.6;        ///< likewise
 };
+/// Elements out of bounds: [element] 1 or 0. Local.
 std::vector<std::uint8_t> misfits(const Mesh& mesh, const Metric& metric, const FitBounds& bounds);
 
 }  // namespace malleus

@@ -26,8 +26,7 @@ void level_largest(const Mesh& mesh, std::vector<std::uint8_t>& values) {
   std::transform(levelled.begin(), levelled.end(), values.begin(), [](Real v) { return static_cast<std::uint8_t>(v); });
 }
 
-std::vector<int> layers_from(const Communicator& /*the halo knows it*/, const Mesh& mesh,
-                             const std::vector<std::uint8_t>& marks, int layers) {
+std::vector<int> layers_from(const Mesh& mesh, const std::vector<std::uint8_t>& marks, int layers) {
   // Nearness, layers + 1 at the marks and 0 beyond, grows by the maximum.
   std::vector<Real> nearness(index(mesh.nodes()), 0);
   for (std::size_t node = 0; node < marks.size(); ++node) nearness[node] = marks[node] != 0 ? layers + 1 : 0;
@@ -57,7 +56,7 @@ std::vector<Real> centroids(const Mesh& mesh) {
   return result;
 }
 
-std::vector<std::uint8_t> elements_at(const Communicator& comm, const Mesh& mesh, const PlaneCuts& cuts, int layers) {
+std::vector<std::uint8_t> elements_at(const Mesh& mesh, const PlaneCuts& cuts, int layers) {
   std::vector<int> part;
   for (LocalId node = 0; node < mesh.nodes(); ++node) part.push_back(cuts.part_of(mesh.point(node)));
   std::vector<std::uint8_t> marks(part.size(), 0);
@@ -67,7 +66,7 @@ std::vector<std::uint8_t> elements_at(const Communicator& comm, const Mesh& mesh
     if (std::all_of(nodes.begin(), nodes.end(), [&](LocalId node) { return part[index(node)] == first; })) continue;
     for (const LocalId node : nodes) marks[index(node)] = 1;
   }
-  const std::vector<int> distance = layers_from(comm, mesh, marks, layers);
+  const std::vector<int> distance = layers_from(mesh, marks, layers);
   std::vector<std::uint8_t> selected(index(mesh.elements()), 0);
   for (LocalId e = 0; e < mesh.elements(); ++e) {
     const auto nodes = mesh.nodes_of_element(e);

@@ -11,8 +11,7 @@ namespace malleus {
 
 /// Distance of nodes from the marked ones, counted in elements: 0 at them, at most `layers`; layers + 1 beyond. Alike
 /// on all holders of a node. marks: [node], alike or not. Collective.
-std::vector<int> layers_from(const Communicator& comm, const Mesh& mesh, const std::vector<std::uint8_t>& marks,
-                             int layers);
+std::vector<int> layers_from(const Mesh& mesh, const std::vector<std::uint8_t>& marks, int layers);
 
 /// The largest of the holders' values at each node, for all of them. Collective.
 void level_largest(const Mesh& mesh, std::vector<Real>& values);
@@ -22,6 +21,6 @@ void level_largest(const Mesh& mesh, std::vector<std::uint8_t>& values);
 std::vector<Real> centroids(const Mesh& mesh);
 
 /// Elements that planes cut or nearly touch, and so many layers about them: [element] 1 or 0. Collective.
-std::vector<std::uint8_t> elements_at(const Communicator& comm, const Mesh& mesh, const PlaneCuts& cuts, int layers);
+std::vector<std::uint8_t> elements_at(const Mesh& mesh, const PlaneCuts& cuts, int layers);
 
 }  // namespace malleus

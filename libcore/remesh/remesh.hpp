@@ -19,11 +19,11 @@ struct RemeshOptions {
   int improvement_rounds = 6;  ///< of swaps and relocation once lengths have settled
 };
 
-/// One phase: of a rank's remesh, seconds of processor time; of a distributed one, of wall time.
+/// Times of one phase.
 struct RemeshPhase {
   std::string name;
-  Real seconds = 0;
-  Real processor_s = 0;  ///< of a distributed one: processor time of the slowest rank, waiting included
+  Real wall_s = 0;       ///< of a distributed remesh alone
+  Real processor_s = 0;  ///< of a distributed remesh: of the slowest rank, waiting included
 };
 
 struct RemeshQuality {

@@ -43,11 +43,11 @@ void Remesher<D, Metric>::timed(const char* phase, const std::function<void()>& 
   const Real seconds = processor_seconds() - start;
   for (auto& known : phases_) {
     if (known.name == phase) {
-      known.seconds += seconds;
+      known.processor_s += seconds;
       return;
     }
   }
-  phases_.push_back({phase, seconds});
+  phases_.push_back({phase, 0, seconds});
 }
 
 template <int D, class Metric>

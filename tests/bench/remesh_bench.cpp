@@ -74,8 +74,8 @@ nlohmann::ordered_json to_json(const RemeshReport& report) {
                                  {"moves", report.moves}};
   Real total = 0;
   for (const auto& phase : report.phases) {
-    json["seconds"][phase.name] = phase.seconds;
-    total += phase.seconds;
+    json["seconds"][phase.name] = phase.processor_s;
+    total += phase.processor_s;
   }
   json["seconds"]["all"] = total;
   rusage usage{};

@@ -7,11 +7,11 @@ import subprocess
 import tempfile
 import threading
 
-from runs import BIN, LAUNCH, PATIENCE as SLOWER
+from runs import BIN, LAUNCH, PATIENCE
 from small_meshes import SmallMesh
 
 MOST_WORK = 10  # processor seconds of all ranks that an answer may take
-PATIENCE = 300  # seconds after which it is no answer, also where others keep the machine busy
+MOST_SECONDS = 300  # seconds after which it is no answer, also where others keep the machine busy
 PIECES = ["[", "]", "=", '"', ";", "#", "\n", "\r", "\t", ".", "^", "(", ")", "/", "-", "1e", "nan", "inf", "free", "\xff", "\0",
           "1e999", "-1", "0", "[body.", "[fluid.x]\n", "MPa", "s^m", "?:", "&&", "sin(", "x", "99999999999", " "]
 VALUES = ["0", "-1", "1", "2", "3", "7", "0.5", "1e-3", "1e-9", "1e3", "1e9", "1e-300", "1e300", "2147483648", "yes", "no", "auto",
@@ -233,7 +233,7 @@ def run(command, directory, sessions):
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said, cwd=directory,
                                    env={**os.environ, "OMPI_MCA_orte_tmpdir_base": str(sessions)})
-        alarm = threading.Timer(PATIENCE, process.kill)
+        alarm = threading.Timer(MOST_SECONDS, process.kill)
         alarm.start()
         _, status, usage = os.wait4(process.pid, 0)
         alarm.cancel()
@@ -275,7 +275,7 @@ class Checker:
             return f"{program} ended with {code} on {ranks} ranks:\n{said}\n{text}"
         if code == 2 and "error: " not in said:
             return f"{program} refused without a word on {ranks} ranks:\n{text}"
-        if seconds > MOST_WORK * SLOWER:
+        if seconds > MOST_WORK * PATIENCE:
             return f"{program} worked for {seconds:.0f} s on {ranks} ranks:\n{text}"
         left = sorted(path.name for path in self.directory.iterdir() if path.name not in ("case.ini", "square.msh"))
         return f"{program} --check wrote {left}:\n{text}" if left else None
